@@ -1,0 +1,471 @@
+/*
+ * libascc: a learned particle fluid solver that conserves momentum to the bit.
+ * SPDX-License-Identifier: MIT
+ *
+ * A host makes a context, loads a model, fills a particle set, binds model and context into a step,
+ * and runs the step: examples/hello.c does all of it in under 100 lines.
+ *
+ * Said once, true of every call:
+ *   results    come back through the last pointers; a struct or array passed in need live only for
+ *              the call; outputs of a failed call are NULL or untouched.
+ *   structs    of options and results begin with `size`, set by the caller to sizeof(the struct).
+ *              Zero in every other member means the default. They only ever grow at the end.
+ *   destroy    takes the address of the handle, sets it to NULL and accepts NULL. The order in which
+ *              handles are destroyed is free: what others still use lives until they are gone.
+ *   errors     every call that can fail returns an ascc_status, and leaves one line that names what
+ *              is wrong in the handle it worked on (ascc_context_message and its kin).
+ *   units      lengths are in the host's unit, seconds, kilograms. The model works in metres; the
+ *              step's option `length_unit` says how many metres the host's unit is.
+ *   the library never prints, aborts, exits or keeps global state.
+ */
+#ifndef ASCC_ASCC_H
+#define ASCC_ASCC_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+#include "version.h"
+
+#if defined(_WIN32) && defined(ASCC_BUILD)
+#define ASCC_API __declspec(dllexport)
+#elif defined(__GNUC__)
+#define ASCC_API __attribute__((visibility("default")))
+#else
+#define ASCC_API
+#endif
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/** Result of every call that can fail. Values are frozen: new ones are added, none reused. */
+typedef enum ascc_status {
+    ASCC_OK = 0,
+    ASCC_ERROR_ARGUMENT = -1,   /* a pointer, size or value that the call does not accept */
+    ASCC_ERROR_MEMORY = -2,     /* the allocator returned NULL, or a size does not fit size_t */
+    ASCC_ERROR_FILE = -3,       /* could not open, read or write */
+    ASCC_ERROR_FORMAT = -4,     /* read, but not a model (or snapshot) this version understands */
+    ASCC_ERROR_NOT_FINITE = -5, /* a NaN or infinity, in the input or produced by the network */
+    ASCC_ERROR_RANGE = -6,      /* a position, momentum or displacement beyond what can be held */
+    ASCC_ERROR_MISMATCH = -7,   /* handles that do not go together, such as 2D and 3D */
+    ASCC_ERROR_LIMIT = -8,      /* more neighbours than the step's settings allow */
+} ascc_status;
+
+/** A short English text for a status, never NULL. Any thread. */
+ASCC_API const char *ascc_status_text(ascc_status status);
+
+/** The version of the library that runs: major * 10000 + minor * 100 + patch. Any thread. */
+ASCC_API int32_t ascc_version(void);
+
+/* ---- Context: memory, log, workers; shared by everything made from it ------------------------ */
+
+typedef struct ascc_context ascc_context;
+
+/** One piece of work for a host's job system: call it once for each index in [0, count). */
+typedef void (*ascc_task)(void *work, int32_t index);
+
+/** Options of ascc_context_create. */
+typedef struct ascc_context_options {
+    size_t size;          /* sizeof(ascc_context_options) */
+    int32_t thread_count; /* threads a step may use at once, the caller's included; 0 = 1 */
+    uint32_t cpu_disable; /* ASCC_CPU_* bits not to use although the CPU has them; 0 = use all */
+
+    /* Memory. All three or none; NULL = the C library's. Called only during calls into the library,
+     * on the thread that makes the call. Blocks are aligned to 64 bytes; `size` is what was asked. */
+    void *(*allocate)(void *user, size_t size, size_t alignment);
+    void *(*reallocate)(void *user, void *memory, size_t old_size, size_t size, size_t alignment);
+    void (*release)(void *user, void *memory, size_t size);
+
+    /* One line, without newline, for each failed call and each notable event; NULL = silent. */
+    void (*log)(void *user, const char *line);
+
+    /* The host's job system. Both or none; NULL = the library's own thread_count - 1 workers.
+     * enqueue hands over `count` tasks, runs or schedules them all, in any order and on any threads,
+     * and returns a token; finish returns when all tasks of that token have run. */
+    void *(*enqueue)(void *user, ascc_task task, void *work, int32_t count);
+    void (*finish)(void *user, void *token);
+
+    void *user; /* handed to the callbacks */
+} ascc_context_options;
+
+#define ASCC_CPU_AVX2 1u   /* x86-64: AVX2 with FMA */
+#define ASCC_CPU_AVX512 2u /* x86-64: AVX-512 F, BW, DQ, VL */
+#define ASCC_CPU_NEON 4u   /* aarch64 */
+
+/**
+ * Makes a context. Contexts are independent of each other.
+ *
+ * options   NULL for all defaults; read during the call, not kept.
+ * context   receives the handle; the caller's, until ascc_context_destroy.
+ * errors    ARGUMENT (thread_count outside [0, 1024], callbacks incomplete, a bit of cpu_disable that
+ *           does not exist), MEMORY.
+ * threads   a context may be used from several threads at once, if its callbacks may.
+ */
+ASCC_API ascc_status ascc_context_create(const ascc_context_options *options,
+                                         ascc_context **context);
+ASCC_API void ascc_context_destroy(ascc_context **context);
+
+/** The ASCC_CPU_* bits this context uses: what the CPU has, less cpu_disable. */
+ASCC_API uint32_t ascc_context_cpu(const ascc_context *context);
+
+/**
+ * Copies the message of the last failed ascc_*_create, ascc_model_load or ascc_model_save on this
+ * context, or "", into text[capacity], always terminated. Returns its whole length. Any thread.
+ */
+ASCC_API size_t ascc_context_message(const ascc_context *context, char *text, size_t capacity);
+
+/* ---- Model: trained weights with the description of their network, read-only ------------------ */
+
+typedef struct ascc_model ascc_model;
+
+/**
+ * Loads a model from a safetensors file (docs/file-format.md). The two published pretrained networks
+ * converted to safetensors (metadata format "ascc.weights") are read as they are.
+ *
+ * context   may be destroyed before the model.
+ * model     receives the handle; the caller's, until ascc_model_destroy.
+ * errors    ARGUMENT, MEMORY, FILE, FORMAT; the context's message names the tensor or key at fault.
+ * cost      reads the file once and keeps its bytes beside the arranged weights.
+ * threads   a model never changes: any number of steps on any threads may share it.
+ */
+ASCC_API ascc_status ascc_model_load(ascc_context *context, const char *path, ascc_model **model);
+
+/** As ascc_model_load, from memory: data[size], copied. */
+ASCC_API ascc_status ascc_model_load_memory(ascc_context *context, const void *data, size_t size,
+                                            ascc_model **model);
+
+/** Writes the model's file again, byte for byte as it was read. errors: ARGUMENT, FILE. */
+ASCC_API ascc_status ascc_model_save(const ascc_model *model, const char *path);
+
+/** The model's file as bytes, *size of them; the model's, valid as long as it lives. */
+ASCC_API const void *ascc_model_bytes(const ascc_model *model, size_t *size);
+
+/** What ascc_model_get_info tells. Lengths in metres, whatever the host's unit. */
+typedef struct ascc_model_info {
+    size_t size; /* sizeof(ascc_model_info) */
+    int32_t dimension;
+    int32_t level_count;        /* branches of the hierarchy; 1 = particles only */
+    int32_t layer_count;        /* values the network computes, last layer included */
+    int32_t conserves_momentum; /* 1: antisymmetric last layer */
+    int32_t conserves_angular_momentum; /* 1: and pair impulses are central */
+    int32_t advected;                   /* 1: the network sees x + dt v*, 0: it sees x */
+    int32_t neighbor_limit;             /* most neighbours a point keeps; 0 = all */
+    int32_t reserved;
+    uint64_t parameter_count;
+    double time_step;        /* s, as trained */
+    double gravity[3];       /* m/s^2, as trained */
+    double particle_spacing; /* m, as trained */
+    double rest_density;     /* kg/m^3; per metre of depth in 2D */
+    double support_radius;   /* m, of the last layer */
+    double receptive_radius; /* m: a particle farther away has no influence in one step */
+    const char *name;        /* the model's strings, valid as long as it lives */
+    const char *description;
+} ascc_model_info;
+
+ASCC_API ascc_status ascc_model_get_info(const ascc_model *model, ascc_model_info *info);
+
+ASCC_API void ascc_model_destroy(ascc_model **model);
+
+/* ---- Particles: fluid and boundary at one instant -------------------------------------------- */
+
+typedef struct ascc_particles ascc_particles;
+
+/** Which particles a call means. Rows of each kind are numbered from 0, in order of addition. */
+typedef enum ascc_kind {
+    ASCC_FLUID = 0,
+    ASCC_BOUNDARY = 1, /* solid walls: fixed points with a unit normal into the fluid, and a body */
+} ascc_kind;
+
+/** A property of a particle that can be set and read. `dimension` numbers each, or one. */
+typedef enum ascc_field {
+    ASCC_POSITION = 0, /* both kinds; length unit */
+    ASCC_VELOCITY = 1, /* fluid; length unit / s. Held as momentum: see ascc_particles_options */
+    ASCC_MASS = 2,     /* fluid; kg, one number. Setting it keeps the velocity */
+    ASCC_NORMAL = 3,   /* boundary; points into the fluid, length 1 */
+} ascc_field;
+
+typedef enum ascc_scalar { ASCC_FLOAT = 0, ASCC_DOUBLE = 1 } ascc_scalar;
+
+/**
+ * Where a host's numbers lie: component c of row i is at data + i * stride + c * component_stride.
+ * {data} alone means packed float[count][components]. An array of structs gives the struct's size as
+ * stride; separate arrays x, y, z give sizeof(float) as stride and their distance as the other.
+ */
+typedef struct ascc_const_array {
+    const void *data;           /* NULL = absent, where the call allows that */
+    ptrdiff_t stride;           /* bytes from row to row; 0 = packed */
+    ptrdiff_t component_stride; /* bytes from component to component; 0 = packed */
+    ascc_scalar scalar;
+    int32_t reserved;
+} ascc_const_array;
+
+typedef struct ascc_array {
+    void *data;
+    ptrdiff_t stride;
+    ptrdiff_t component_stride;
+    ascc_scalar scalar;
+    int32_t reserved;
+} ascc_array;
+
+/** Options of ascc_particles_create. dimension and spacing are required. */
+typedef struct ascc_particles_options {
+    size_t size;       /* sizeof(ascc_particles_options) */
+    int32_t dimension; /* 2 or 3 */
+    int32_t reserved;
+    double spacing; /* particle spacing, length unit: what the set's model was trained with */
+    double mass;    /* kg, of a particle added without one; 0 = 1 */
+    /* Momentum is held in whole multiples of this, kg length/s; 0 = 2^-28 of the power of two below
+     * mass * spacing / s: fine enough for 1e-9 spacings/s, coarse enough for 1e10. */
+    double momentum_quantum;
+    size_t fluid_capacity, boundary_capacity; /* room to make at once */
+} ascc_particles_options;
+
+/**
+ * Makes an empty particle set.
+ *
+ * errors    ARGUMENT (dimension, spacing, mass or quantum out of range; NULL), MEMORY.
+ * threads   one thread at a time per particle set; reading is not changing.
+ */
+ASCC_API ascc_status ascc_particles_create(ascc_context *context,
+                                           const ascc_particles_options *options,
+                                           ascc_particles **particles);
+ASCC_API void ascc_particles_destroy(ascc_particles **particles);
+
+/** Makes room so that adding up to these counts allocates nothing. errors: ARGUMENT, MEMORY. */
+ASCC_API ascc_status ascc_particles_reserve(ascc_particles *particles, size_t fluid,
+                                            size_t boundary);
+
+/**
+ * Adds fluid particles at the end.
+ *
+ * position  [count][dimension], length unit
+ * velocity  [count][dimension], length unit / s; data NULL = at rest. NULL pointer likewise.
+ * mass      [count], kg, > 0; NULL = the set's
+ * ids       uint64_t[count], receives ids that stay with the particles; NULL if not wanted.
+ * errors    ARGUMENT (mass <= 0), MEMORY, NOT_FINITE, RANGE; on error nothing was added.
+ */
+ASCC_API ascc_status ascc_particles_add_fluid(ascc_particles *particles, size_t count,
+                                              const ascc_const_array *position,
+                                              const ascc_const_array *velocity,
+                                              const ascc_const_array *mass, uint64_t *ids);
+
+/**
+ * Adds boundary particles of one body at the end.
+ *
+ * position  [count][dimension], length unit
+ * normal    [count][dimension], unit vectors into the fluid
+ * body      the host's number for the solid these points belong to, >= 0
+ * errors    as ascc_particles_add_fluid.
+ */
+ASCC_API ascc_status ascc_particles_add_boundary(ascc_particles *particles, size_t count,
+                                                 const ascc_const_array *position,
+                                                 const ascc_const_array *normal, int32_t body,
+                                                 uint64_t *ids);
+
+/**
+ * Removes particles of either kind by id; the others keep their order.
+ *
+ * errors    ARGUMENT: an id unknown, or given twice; then nothing was removed. MEMORY.
+ * cost      O(particles + count log count).
+ */
+ASCC_API ascc_status ascc_particles_remove(ascc_particles *particles, size_t count,
+                                           const uint64_t *ids);
+
+/** Drops all particles of a kind; memory stays. errors: ARGUMENT. */
+ASCC_API ascc_status ascc_particles_clear(ascc_particles *particles, ascc_kind kind);
+
+/**
+ * Makes the fluid `count` particles: drops the last rows, or adds rows at the origin, at rest and
+ * with the set's mass, whose positions the caller sets next. errors: ARGUMENT, MEMORY.
+ */
+ASCC_API ascc_status ascc_particles_resize_fluid(ascc_particles *particles, size_t count);
+
+ASCC_API size_t ascc_particles_count(const ascc_particles *particles, ascc_kind kind);
+ASCC_API size_t ascc_particles_capacity(const ascc_particles *particles, ascc_kind kind);
+ASCC_API int32_t ascc_particles_dimension(const ascc_particles *particles);
+
+/**
+ * Sets a field of rows [first, first + count).
+ *
+ * errors    ARGUMENT (rows beyond the end, a field the kind does not have, mass <= 0), NOT_FINITE,
+ *           RANGE; on error nothing was set.
+ */
+ASCC_API ascc_status ascc_particles_set(ascc_particles *particles, ascc_kind kind, ascc_field field,
+                                        size_t first, size_t count, const ascc_const_array *values);
+
+/** Reads a field of rows [first, first + count) into the host's array. errors: ARGUMENT. */
+ASCC_API ascc_status ascc_particles_get(const ascc_particles *particles, ascc_kind kind,
+                                        ascc_field field, size_t first, size_t count,
+                                        const ascc_array *values);
+
+/** Ids of rows [first, first + count), uint64_t[count]. errors: ARGUMENT. */
+ASCC_API ascc_status ascc_particles_get_ids(const ascc_particles *particles, ascc_kind kind,
+                                            size_t first, size_t count, uint64_t *ids);
+
+/** Bodies of boundary rows [first, first + count), int32_t[count]. errors: ARGUMENT. */
+ASCC_API ascc_status ascc_particles_get_bodies(const ascc_particles *particles, size_t first,
+                                               size_t count, int32_t *bodies);
+
+/** Where a particle is now. errors: ARGUMENT: no particle has this id. cost: O(log particles). */
+ASCC_API ascc_status ascc_particles_find(const ascc_particles *particles, uint64_t id,
+                                         ascc_kind *kind, size_t *row);
+
+/** What one unit of the integers below is worth, kg length/s; a power of two unless given. */
+ASCC_API double ascc_particles_momentum_quantum(const ascc_particles *particles);
+
+/**
+ * Momentum of fluid rows [first, first + count) in quanta, int64_t[count][dimension]: the state
+ * itself, of which velocities are readings. errors: ARGUMENT.
+ */
+ASCC_API ascc_status ascc_particles_get_momentum(const ascc_particles *particles, size_t first,
+                                                 size_t count, int64_t *momentum);
+
+/**
+ * Total momentum of the fluid in quanta, exact; total[2] is 0 in 2D (METHOD section 4; without
+ * gravity and walls it never changes). errors: ARGUMENT, RANGE (the sum does not fit).
+ */
+ASCC_API ascc_status ascc_particles_total_momentum(const ascc_particles *particles,
+                                                   int64_t total[3]);
+
+/**
+ * What the last step gave to a boundary body: equal and opposite to what the body gave the fluid.
+ *
+ * body      as given when its points were added; -1 = all bodies together
+ * point     about which the torque is meant, length unit; NULL = the origin
+ * impulse   receives quanta, exact; [2] is 0 in 2D. NULL if not wanted.
+ * torque    receives kg length^2/s, angular impulse; in 2D only [2] is used. NULL if not wanted.
+ * errors    ARGUMENT, RANGE. cost: O(boundary particles). All zero before the first step.
+ */
+ASCC_API ascc_status ascc_particles_body_impulse(const ascc_particles *particles, int32_t body,
+                                                 const double point[3], int64_t impulse[3],
+                                                 double torque[3]);
+
+/** Bytes ascc_particles_snapshot needs. */
+ASCC_API size_t ascc_particles_snapshot_size(const ascc_particles *particles);
+
+/**
+ * Writes the whole state into memory[capacity]: same bytes for same state, on any machine.
+ * errors: ARGUMENT (capacity too small).
+ */
+ASCC_API ascc_status ascc_particles_snapshot(const ascc_particles *particles, void *memory,
+                                             size_t capacity);
+
+/**
+ * Makes the set what it was when the snapshot was taken; a run goes on from there bit for bit.
+ * errors: ARGUMENT, FORMAT (not a snapshot, damaged), MISMATCH (other dimension), MEMORY; on error
+ * the set is unchanged.
+ */
+ASCC_API ascc_status ascc_particles_restore(ascc_particles *particles, const void *memory,
+                                            size_t size);
+
+/**
+ * A hash of all positions, momenta, masses, normals and bodies. It does not depend on the order of
+ * rows or on ids: equal scenes added in another order have equal hashes. cost: O(particles).
+ */
+ASCC_API uint64_t ascc_particles_hash(const ascc_particles *particles);
+
+/** The message of the last call on this set that failed, or "". The set's, until its next call. */
+ASCC_API const char *ascc_particles_message(const ascc_particles *particles);
+
+/** What ascc_particles_measure finds. Sums run over the fluid in the host's units. */
+typedef struct ascc_measures {
+    size_t size; /* sizeof(ascc_measures) */
+    double mass;
+    double center[3];           /* of mass */
+    double momentum[3];         /* kg length/s: a reading; ascc_particles_total_momentum is exact */
+    double angular_momentum[3]; /* about the origin; in 2D only [2] */
+    double angular_scale;       /* sum of m |x - center| |v|: what an angular error compares with */
+    double kinetic_energy;
+    double max_speed;
+    /* Number density by the poly6 kernel with support 2 spacings, walls counted as particles, relative
+     * to an unbounded square or cubic lattice of that spacing: 1 = rest. */
+    double max_density, mean_density;
+    double min_distance; /* between any two fluid particles; 0 with fewer than two */
+    uint64_t close_count; /* fluid particles with another nearer than half a spacing */
+} ascc_measures;
+
+/** Measures the set (METHOD section 9). errors: ARGUMENT, MEMORY, RANGE. cost: one neighbour search. */
+ASCC_API ascc_status ascc_particles_measure(ascc_particles *particles, ascc_measures *measures);
+
+/* ---- Step: a model bound to the scratch memory it needs to advance particles ------------------ */
+
+typedef struct ascc_step ascc_step;
+
+/** Options of ascc_step_create. */
+typedef struct ascc_step_options {
+    size_t size;        /* sizeof(ascc_step_options) */
+    double time_step;   /* s; 0 = the model's. With another one the learned velocity correction is
+                         * scaled by time_step / the model's, as an acceleration would be. */
+    double length_unit; /* metres in one unit of the host's length; 0 = 1. 0.01 for centimetres */
+    double max_displacement; /* length unit a particle may move in a step, else RANGE; 0 = no bound */
+    int32_t max_neighbors;   /* most neighbours of one point before LIMIT is returned; 0 = 4096 */
+    int32_t reserved;
+} ascc_step_options;
+
+/**
+ * Makes a step. Model and context may be destroyed before it.
+ *
+ * options   NULL for all defaults; read during the call.
+ * errors    ARGUMENT (a value negative or not finite), MEMORY.
+ */
+ASCC_API ascc_status ascc_step_create(ascc_context *context, const ascc_model *model,
+                                      const ascc_step_options *options, ascc_step **step);
+ASCC_API void ascc_step_destroy(ascc_step **step);
+
+/** What acts on the fluid from outside during ascc_step_run; NULL pointers are the defaults. */
+typedef struct ascc_forces {
+    size_t size;           /* sizeof(ascc_forces) */
+    const double *gravity; /* [dimension], length unit / s^2; NULL = the model's */
+    const ascc_const_array *acceleration; /* [fluid count][dimension], added to gravity; NULL = none */
+} ascc_forces;
+
+/**
+ * Advances the fluid by `count` time steps (METHOD section 1). Walls do not move.
+ *
+ * forces    NULL = the model's gravity alone.
+ * errors    ARGUMENT, MISMATCH (dimension), MEMORY (scratch had to grow), NOT_FINITE, RANGE, LIMIT.
+ *           Each step is a transaction: on error the set is, bit for bit, as after the last step that
+ *           succeeded; ascc_step_statistics says how many did.
+ * cost      O(neighbour pairs). Scratch grows to the largest scene seen and is then reused.
+ * promise   With an antisymmetric last layer: the integer momentum of the fluid changes by the
+ *           external impulse and by what walls received, and by nothing else. Same input, same bits
+ *           out, for any thread_count, host task order, CPU, and order of the particles.
+ * threads   one thread at a time per step and per particle set.
+ */
+ASCC_API ascc_status ascc_step_run(ascc_step *step, ascc_particles *particles,
+                                   const ascc_forces *forces, int32_t count);
+
+/** What ascc_step_get_statistics tells of the last ascc_step_run. */
+typedef struct ascc_step_statistics {
+    size_t size; /* sizeof(ascc_step_statistics) */
+    int32_t steps;       /* that succeeded in the last run */
+    int32_t level_count; /* entries used of level_points */
+    /* Wall-clock seconds of the last step. */
+    double seconds_total;
+    double seconds_prepare;    /* forces, advection, features */
+    double seconds_hierarchy;  /* sorting and sampling the levels */
+    double seconds_search;     /* neighbour rows and interpolation coordinates */
+    double seconds_network;    /* all layers but the last */
+    double seconds_last_layer; /* pair impulses */
+    double seconds_commit;     /* new momenta and positions */
+    uint64_t level_points[16]; /* points on each level; level 0: fluid and the walls it sees */
+    uint64_t pair_count;       /* neighbour pairs of the last layer, unordered */
+    uint64_t neighbor_count;   /* entries of all neighbour rows */
+    uint64_t max_neighbors;    /* of one point in one row */
+    uint64_t scratch_size;     /* bytes the step holds */
+    /* Quanta of momentum, exact; [2] is 0 in 2D. before + external - wall = after, if the model
+     * conserves momentum; else the difference is what its last layer made or lost. */
+    int64_t momentum_before[3], momentum_after[3], external_impulse[3], wall_impulse[3];
+} ascc_step_statistics;
+
+ASCC_API ascc_status ascc_step_get_statistics(const ascc_step *step,
+                                              ascc_step_statistics *statistics);
+
+/** The message of the last call on this step that failed, or "". The step's, until its next call. */
+ASCC_API const char *ascc_step_message(const ascc_step *step);
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif

@@ -1,0 +1,59 @@
+/* What every file uses: assertions, checked sizes, and the line that says what went wrong.
+ * SPDX-License-Identifier: MIT */
+#ifndef ASCC_COMMON_H
+#define ASCC_COMMON_H
+
+#include <assert.h>
+#include <stdarg.h>
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include <ascc/ascc.h>
+
+#define ASCC_MESSAGE_CAPACITY 256
+
+/* One line of text about the last failure of a handle. */
+typedef struct ascc_message {
+    char text[ASCC_MESSAGE_CAPACITY];
+} ascc_message;
+
+#if defined(__GNUC__)
+#define ASCC_PRINTF(format, first) __attribute__((format(printf, format, first)))
+#else
+#define ASCC_PRINTF(format, first)
+#endif
+
+/* Writes the line and returns the status, so that failures read: return ascc_fail(m, status, ...)
+ */
+ascc_status ascc_fail(ascc_message *message, ascc_status status, const char *format, ...)
+    ASCC_PRINTF(3, 4);
+
+/* Reads a struct that begins with its size: copies what the caller has over zeros. Refuses one
+ * smaller than `first_size` (the first released layout), or longer with a tail that is not zero. */
+bool ascc_read_struct(void *into, size_t into_size, const void *from, size_t first_size);
+
+/* The same for results: writes min(the caller's size, from_size) bytes and keeps the caller's size.
+ */
+bool ascc_write_struct(void *into, const void *from, size_t from_size, size_t first_size);
+
+/* *result = a * b, false if it does not fit. */
+static inline bool ascc_multiply_size(size_t a, size_t b, size_t *result)
+{
+    if (b != 0 && a > SIZE_MAX / b)
+        return false;
+    *result = a * b;
+    return true;
+}
+
+static inline size_t ascc_min_size(size_t a, size_t b)
+{
+    return a < b ? a : b;
+}
+
+static inline size_t ascc_max_size(size_t a, size_t b)
+{
+    return a > b ? a : b;
+}
+
+#endif

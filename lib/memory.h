@@ -1,0 +1,58 @@
+/* The caller's allocator, and the arena that a step takes its scratch from.
+ * SPDX-License-Identifier: MIT */
+#ifndef ASCC_MEMORY_H
+#define ASCC_MEMORY_H
+
+#include "common.h"
+
+#define ASCC_ALIGNMENT 64
+
+typedef struct ascc_allocator {
+    void *(*allocate)(void *user, size_t size, size_t alignment);
+    void *(*reallocate)(void *user, void *memory, size_t old_size, size_t size, size_t alignment);
+    void (*release)(void *user, void *memory, size_t size);
+    void *user;
+} ascc_allocator;
+
+/* The C library's allocator. */
+ascc_allocator ascc_allocator_default(void);
+
+/* count * element bytes, aligned; NULL when that does not fit or there is no memory. A count of
+ * zero gives a valid pointer. release takes the same count and element. */
+void *ascc_allocate(const ascc_allocator *allocator, size_t count, size_t element);
+void ascc_release(const ascc_allocator *allocator, void *memory, size_t count, size_t element);
+
+/* Makes room for `count` elements in an array that has room for *capacity; contents stay. Grows to
+ * at least 1.5 times. False and unchanged when there is no memory. */
+bool ascc_grow(const ascc_allocator *allocator, void **memory, size_t *capacity, size_t count,
+               size_t element);
+
+/*
+ * Hands out aligned pieces that live until the next reset.
+ *
+ *   block:  [ piece | piece | piece |      free      ]    reset: used = 0
+ *   what does not fit goes into overflow blocks; reset replaces block and overflow by one block of
+ *   1.25 times what was needed, so a steady user allocates nothing.
+ */
+typedef struct ascc_arena_overflow ascc_arena_overflow;
+
+typedef struct ascc_arena {
+    const ascc_allocator *allocator;
+    unsigned char *block;
+    size_t block_size;
+    size_t used;   /* of block */
+    size_t needed; /* since the last reset, overflow included */
+    ascc_arena_overflow *overflow;
+} ascc_arena;
+
+void ascc_arena_open(ascc_arena *arena, const ascc_allocator *allocator);
+void ascc_arena_close(ascc_arena *arena);
+/* count elements, not cleared; NULL when there is no memory. */
+void *ascc_arena_take(ascc_arena *arena, size_t count, size_t element);
+/* Gives back everything handed out. Never fails: without memory for a larger block it keeps the
+ * old. */
+void ascc_arena_reset(ascc_arena *arena);
+/* Bytes held now. */
+size_t ascc_arena_size(const ascc_arena *arena);
+
+#endif

@@ -1,0 +1,149 @@
+/* A network as the solver runs it: an immutable plan of layers, checked once when it is loaded.
+ * SPDX-License-Identifier: MIT
+ *
+ * The plan is a list of values. Value 0 holds the features of the fluid particles, value 1 those of
+ * the boundary particles; layer i makes value i + 2, on one point set, as a sum of terms:
+ *
+ *     value[row][column ..] += term(source value)
+ *
+ * so "concat" is terms with different columns, "sum" terms with the same.
+ */
+#ifndef ASCC_MODEL_H
+#define ASCC_MODEL_H
+
+#include "context.h"
+
+#define ASCC_MAX_LEVELS 8
+#define ASCC_MAX_CHANNELS 1024
+#define ASCC_MAX_CELLS 4096 /* of one kernel */
+
+/* Point sets. Level 0 is fluid + boundary; set ASCC_SET_LEVEL + l - 1 is level l >= 1. */
+enum { ASCC_SET_FLUID = 0, ASCC_SET_BOUNDARY = 1, ASCC_SET_ALL = 2, ASCC_SET_LEVEL = 3 };
+#define ASCC_MAX_SETS (ASCC_SET_LEVEL + ASCC_MAX_LEVELS - 1)
+
+typedef enum ascc_window { ASCC_WINDOW_NONE, ASCC_WINDOW_POLY6, ASCC_WINDOW_PEAK } ascc_window;
+
+typedef enum ascc_mapping {
+    ASCC_MAPPING_IDENTITY, /* the ball's bounding cube */
+    ASCC_MAPPING_RADIAL,   /* r scaled so that the ball fills the cube */
+    ASCC_MAPPING_VOLUME,   /* volume preserving (SEMANTICS 2) */
+} ascc_mapping;
+
+/* How a convolution looks around a point. */
+typedef struct ascc_filter {
+    int32_t cells[3];       /* of the kernel along x, y, z; 2D: z = 1 */
+    int32_t neighbor_limit; /* mutual where source and query are one set; 0 = none */
+    ascc_window window;
+    ascc_mapping mapping;
+    int32_t skip_self; /* a point with the query's very position is no neighbour */
+    int32_t reserved;
+    double radius; /* m */
+} ascc_filter;
+
+typedef enum ascc_term_kind {
+    ASCC_TERM_CONVOLUTION,
+    ASCC_TERM_DENSE,    /* on the rows that source set and layer set share */
+    ASCC_TERM_IDENTITY, /* residual: likewise, without weights */
+} ascc_term_kind;
+
+typedef struct ascc_term {
+    ascc_term_kind kind;
+    int32_t source;  /* value, made earlier */
+    int32_t rectify; /* ReLU on the source's values as they are read */
+    int32_t column;  /* first column of the layer it adds to */
+    int32_t inputs;  /* channels of the source */
+    int32_t outputs; /* columns it adds to; column + outputs <= layer's channels */
+    const float
+        *weight; /* convolution [z][y][x][inputs][outputs], dense [inputs][outputs], else NULL */
+    const float
+        *bias; /* [outputs] or NULL; added to every row the term reaches, also without neighbours */
+    ascc_filter filter; /* of a convolution */
+} ascc_term;
+
+typedef struct ascc_layer {
+    char name[32];
+    int32_t set;
+    int32_t channels;
+    int32_t first_term, term_count;
+} ascc_layer;
+
+typedef enum ascc_output_kind {
+    ASCC_OUTPUT_PLAIN,         /* the source value is the correction; dimension channels */
+    ASCC_OUTPUT_ANTISYMMETRIC, /* Eq. 2 on the source value */
+} ascc_output_kind;
+
+typedef struct ascc_output {
+    ascc_output_kind kind;
+    int32_t source;
+    int32_t rectify;
+    int32_t inputs;
+    int32_t radial; /* pair terms projected on the line between the particles */
+    int32_t reserved;
+    ascc_filter filter;
+    const float *weight; /* antisymmetric: the whole kernel [z][y][x][inputs][dimension] */
+    double scale[3];     /* metres of position correction in one time step per unit of output */
+} ascc_output;
+
+typedef enum ascc_feature {
+    ASCC_FEATURE_ONE,
+    ASCC_FEATURE_VELOCITY, /* fluid: after external forces, m/s; dimension channels */
+    ASCC_FEATURE_NORMAL,   /* boundary; dimension channels */
+} ascc_feature;
+#define ASCC_MAX_FEATURES 8
+
+typedef enum ascc_sampling {
+    ASCC_SAMPLING_CENTERS,  /* centres of occupied voxels (the paper) */
+    ASCC_SAMPLING_CORNERS,  /* corners of cells with hysteresis (the published networks) */
+    ASCC_SAMPLING_FARTHEST, /* farthest points (the paper's ablation) */
+} ascc_sampling;
+
+typedef struct ascc_level {
+    double voxel; /* m, level >= 1 */
+    double ratio; /* farthest: points kept of level 0, in (0, 1] */
+} ascc_level;
+
+typedef enum ascc_advection {
+    ASCC_ADVECT_NONE, /* the network sees x (the paper, figure 1) */
+    ASCC_ADVECT_END,  /* x + dt v*; v* = v + dt g */
+    ASCC_ADVECT_MEAN, /* x + dt (v + v*) / 2, and that mean is the velocity corrected (CConv) */
+} ascc_advection;
+
+typedef struct ascc_plan {
+    char name[64];
+    char description[512];
+    int32_t dimension;
+    ascc_advection advection;
+    double time_step, gravity[3], spacing, rest_density;
+    int32_t fluid_features[ASCC_MAX_FEATURES], fluid_feature_count, fluid_channels;
+    int32_t boundary_features[ASCC_MAX_FEATURES], boundary_feature_count, boundary_channels;
+    double boundary_crop; /* m: walls farther than this from the fluid's bounding box are left out;
+                             <= 0: none are */
+    int32_t level_count;
+    ascc_sampling sampling;
+    int32_t
+        centroid_anchor; /* voxel grids hang on the mean of level 0 instead of the world's origin */
+    int32_t reserved;
+    double hysteresis; /* of ASCC_SAMPLING_CORNERS, in voxels */
+    ascc_level level[ASCC_MAX_LEVELS];
+    int32_t layer_count, term_count;
+    ascc_layer *layer;
+    ascc_term *term;
+    ascc_output output;
+    uint64_t parameter_count;
+} ascc_plan;
+
+struct ascc_model {
+    uint32_t magic;
+    ascc_context *context;            /* retained */
+    struct ascc_model_shared *shared; /* reference count */
+    unsigned char *bytes;             /* the file as it was read */
+    size_t byte_count;
+    float *weights; /* all tensors, arranged and aligned; the plan points into it */
+    size_t weight_count;
+    ascc_plan plan;
+};
+
+void ascc_model_retain(ascc_model *model);
+void ascc_model_release(ascc_model *model);
+
+#endif
