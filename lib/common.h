@@ -19,9 +19,9 @@ typedef struct ascc_message {
 } ascc_message;
 
 #if defined(__GNUC__)
-#define ASCC_PRINTF(format, first) __attribute__((format(printf, format, first)))
+#define ASCC_PRINTF(text, first) __attribute__((format(printf, text, first)))
 #else
-#define ASCC_PRINTF(format, first)
+#define ASCC_PRINTF(text, first)
 #endif
 
 /* Writes the line and returns the status, so that failures read: return ascc_fail(m, status, ...)

@@ -144,9 +144,9 @@ ASCC_API const void *ascc_model_bytes(const ascc_model *model, size_t *size);
 typedef struct ascc_model_info {
     size_t size; /* sizeof(ascc_model_info) */
     int32_t dimension;
-    int32_t level_count;        /* branches of the hierarchy; 1 = particles only */
-    int32_t layer_count;        /* values the network computes, last layer included */
-    int32_t conserves_momentum; /* 1: antisymmetric last layer */
+    int32_t level_count;                /* branches of the hierarchy; 1 = particles only */
+    int32_t layer_count;                /* values the network computes, last layer included */
+    int32_t conserves_momentum;         /* 1: antisymmetric last layer */
     int32_t conserves_angular_momentum; /* 1: and pair impulses are central */
     int32_t advected;                   /* 1: the network sees x + dt v*, 0: it sees x */
     int32_t neighbor_limit;             /* most neighbours a point keeps; 0 = all */
@@ -380,7 +380,7 @@ typedef struct ascc_measures {
     /* Number density by the poly6 kernel with support 2 spacings, walls counted as particles, relative
      * to an unbounded square or cubic lattice of that spacing: 1 = rest. */
     double max_density, mean_density;
-    double min_distance; /* between any two fluid particles; 0 with fewer than two */
+    double min_distance;  /* between any two fluid particles; 0 with fewer than two */
     uint64_t close_count; /* fluid particles with another nearer than half a spacing */
 } ascc_measures;
 
@@ -397,8 +397,9 @@ typedef struct ascc_step_options {
     double time_step;   /* s; 0 = the model's. With another one the learned velocity correction is
                          * scaled by time_step / the model's, as an acceleration would be. */
     double length_unit; /* metres in one unit of the host's length; 0 = 1. 0.01 for centimetres */
-    double max_displacement; /* length unit a particle may move in a step, else RANGE; 0 = no bound */
-    int32_t max_neighbors;   /* most neighbours of one point before LIMIT is returned; 0 = 4096 */
+    double
+        max_displacement;  /* length unit a particle may move in a step, else RANGE; 0 = no bound */
+    int32_t max_neighbors; /* most neighbours of one point before LIMIT is returned; 0 = 4096 */
     int32_t reserved;
 } ascc_step_options;
 
@@ -416,7 +417,8 @@ ASCC_API void ascc_step_destroy(ascc_step **step);
 typedef struct ascc_forces {
     size_t size;           /* sizeof(ascc_forces) */
     const double *gravity; /* [dimension], length unit / s^2; NULL = the model's */
-    const ascc_const_array *acceleration; /* [fluid count][dimension], added to gravity; NULL = none */
+    const ascc_const_array
+        *acceleration; /* [fluid count][dimension], added to gravity; NULL = none */
 } ascc_forces;
 
 /**
@@ -437,7 +439,7 @@ ASCC_API ascc_status ascc_step_run(ascc_step *step, ascc_particles *particles,
 
 /** What ascc_step_get_statistics tells of the last ascc_step_run. */
 typedef struct ascc_step_statistics {
-    size_t size; /* sizeof(ascc_step_statistics) */
+    size_t size;         /* sizeof(ascc_step_statistics) */
     int32_t steps;       /* that succeeded in the last run */
     int32_t level_count; /* entries used of level_points */
     /* Wall-clock seconds of the last step. */
