@@ -35,6 +35,9 @@ struct ascc_particles {
 /* Largest magnitude of one particle's momentum, in quanta: sums of two never overflow. */
 #define ASCC_MOMENTUM_LIMIT ((int64_t)1 << 61)
 
+/* Largest magnitude of a coordinate, in spacings. */
+#define ASCC_POSITION_LIMIT 1099511627776.0
+
 /* Quanta nearest to a momentum; false when not finite or beyond ASCC_MOMENTUM_LIMIT. Rounds to
  * even. */
 bool ascc_to_quanta(double momentum, double quantum, int64_t *quanta);

@@ -377,8 +377,9 @@ typedef struct ascc_measures {
     double angular_scale;       /* sum of m |x - center| |v|: what an angular error compares with */
     double kinetic_energy;
     double max_speed;
-    /* Number density by the poly6 kernel with support 2 spacings, walls counted as particles, relative
-     * to an unbounded square or cubic lattice of that spacing: 1 = rest. */
+    /* Number density of the fluid by the poly6 kernel with support 2 spacings, relative to an
+     * unbounded square or cubic lattice of that spacing: 1 = rest. Walls are not counted, so it falls
+     * towards walls and surfaces; its maximum tells compression. */
     double max_density, mean_density;
     double min_distance;  /* between any two fluid particles; 0 with fewer than two */
     uint64_t close_count; /* fluid particles with another nearer than half a spacing */

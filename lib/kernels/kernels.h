@@ -17,10 +17,10 @@ typedef struct ascc_coordinates {
 } ascc_coordinates;
 
 /* Geometry of neighbour pairs, one entry a pair: where the neighbour lies in the kernel's cube
- * [-1, 1]^3, and the window's value there. */
+ * [-1, 1]^3, and the value of each window there (by ascc_window; NULL = not wanted). */
 typedef struct ascc_pairs {
     float *x, *y, *z;
-    float *window;
+    float *window[3];
 } ascc_pairs;
 
 typedef struct ascc_kernels {
@@ -30,15 +30,15 @@ typedef struct ascc_kernels {
     size_t (*search)(const ascc_coordinates *points, size_t begin, size_t end, int32_t x, int32_t y,
                      int32_t z, float limit, uint32_t *found);
 
-    /* pairs[k] of the displacements neighbour[k] - (x, y, z), scaled by inverse_radius into the
-     * unit ball. mapping and window are ascc_mapping and ascc_window. */
+    /* pairs[k] of the displacements neighbour[k] - (x, y, z), scaled by inverse_radius into the unit
+     * ball and mapped to the cube. mapping is an ascc_mapping. */
     void (*geometry)(const ascc_coordinates *points, const uint32_t *neighbor, size_t k, int32_t x,
-                     int32_t y, int32_t z, float inverse_radius, int mapping, int window,
+                     int32_t y, int32_t z, float inverse_radius, int mapping,
                      const ascc_pairs *pairs);
 
-    /* column[c][a] = sum over k of window * trilinear weight * feature[neighbor[k]][a], neighbours
-     * in order. cells: along x, y, z. column is overwritten. */
-    void (*gather)(const ascc_pairs *pairs, const uint32_t *neighbor, size_t k,
+    /* column[c][a] = sum over k of window * trilinear weight * feature[neighbor[k]][a], neighbours in
+     * order; window NULL = 1. cells: along x, y, z. column is overwritten. */
+    void (*gather)(const ascc_pairs *pairs, const float *window, const uint32_t *neighbor, size_t k,
                    const float *feature, size_t a, const int32_t cells[3], float *column);
 
     /* out[n][out_stride] += in[n][a] * weight[a][b]: each output one chain of fma over ascending a.
@@ -46,11 +46,12 @@ typedef struct ascc_kernels {
     void (*multiply)(const float *in, size_t in_stride, size_t n, size_t a, const float *weight,
                      size_t b, float *out, size_t out_stride);
 
-    /* out[j] = sum over c, a of window * trilinear weight * (center[a] + feature[neighbor[j]][a]) *
-     * weight[c][a][b], for each pair j < k on its own; b <= 3, out is [k][4]. */
-    void (*pair_terms)(const ascc_pairs *pairs, const uint32_t *neighbor, size_t k,
-                       const float *center, const float *feature, size_t a, const int32_t cells[3],
-                       const float *weight, size_t b, float *out);
+    /* out[j][b] = window * sum over a of (center[a] + feature[neighbor[j]][a]) * kernel(j)[b][a],
+     * kernel(j) = sum over c of trilinear weight * weight[c][b][a], for each pair j < k on its own.
+     * a is a multiple of 8, 8 partial sums by a mod 8; b <= 3, out is [k][4]; a * b <= 3072. */
+    void (*pair_terms)(const ascc_pairs *pairs, const float *window, const uint32_t *neighbor,
+                       size_t k, const float *center, const float *feature, size_t a,
+                       const int32_t cells[3], const float *weight, size_t b, float *out);
 } ascc_kernels;
 
 /* Fills the table with the best variants among the bits of cpu (ASCC_CPU_*). */

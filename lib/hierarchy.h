@@ -1,0 +1,46 @@
+/* The point sets a network runs on: fluid, boundary, both, and the coarser levels (paper section 3.3).
+ * SPDX-License-Identifier: MIT */
+#ifndef ASCC_HIERARCHY_H
+#define ASCC_HIERARCHY_H
+
+#include "model.h"
+#include "neighbors.h"
+
+#define ASCC_MAX_GRIDS 64
+
+typedef struct ascc_hierarchy {
+    ascc_scale scale;
+    ascc_points set[ASCC_MAX_SETS];
+    size_t fluid_count; /* rows of the host's fluid */
+    /* Rows of ASCC_SET_ALL, fluid and boundary in one order: */
+    uint32_t *origin;   /* the host's row: fluid row, or fluid_count + boundary row */
+    uint32_t *part;     /* the row in ASCC_SET_FLUID or ASCC_SET_BOUNDARY */
+    uint32_t *whole[2]; /* and back: [set row] of fluid, boundary */
+    ascc_extent extent; /* of all sets */
+    double base_radius; /* units: level 0 is in the order of cells for it */
+    int grid_count;
+    struct {
+        int set;
+        double radius;
+        ascc_grid grid;
+    } grid[ASCC_MAX_GRIDS];
+} ascc_hierarchy;
+
+/* Where the network sees the particles, metres. */
+typedef struct ascc_scene {
+    size_t fluid_count, boundary_count;
+    const double *fluid, *boundary; /* [count][dimension] */
+} ascc_scene;
+
+/* Builds all sets the plan uses in the arena. errors: MEMORY, RANGE. */
+ascc_status ascc_hierarchy_build(ascc_hierarchy *hierarchy, const ascc_search_tools *tools,
+                                 const ascc_plan *plan, const ascc_scene *scene);
+
+/* The grid of a set for a search radius in units, made when first asked for. errors: MEMORY, RANGE. */
+ascc_status ascc_hierarchy_grid(ascc_hierarchy *hierarchy, const ascc_search_tools *tools, int set,
+                                double radius, const ascc_grid **grid);
+
+/* Largest and smallest radius of any layer, metres. */
+void ascc_plan_radii(const ascc_plan *plan, double *smallest, double *largest);
+
+#endif

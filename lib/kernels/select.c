@@ -1,0 +1,25 @@
+/* From the CPU's features to the kernel table. SPDX-License-Identifier: MIT */
+#include <ascc/ascc.h>
+
+#include "kernels.h"
+
+uint32_t ascc_kernels_available(void)
+{
+    uint32_t cpu = 0;
+#if defined(ASCC_HAVE_AVX2)
+    __builtin_cpu_init();
+    if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma"))
+        cpu |= ASCC_CPU_AVX2;
+#endif
+    return cpu;
+}
+
+void ascc_kernels_select(ascc_kernels *kernels, uint32_t cpu)
+{
+    (void)cpu;
+    ascc_kernels_portable(kernels);
+#if defined(ASCC_HAVE_AVX2)
+    if (cpu & ASCC_CPU_AVX2)
+        ascc_kernels_avx2(kernels);
+#endif
+}

@@ -1,0 +1,670 @@
+/* Fixed-radius search: cell sort, runs of cells, neighbour rows made on demand.
+ * SPDX-License-Identifier: MIT */
+#include "neighbors.h"
+
+#include <math.h>
+#include <string.h>
+
+/* A radius takes at most 2^27 units, so that the difference of two points three cells apart fits the
+ * low word of a position and is exact. */
+#define RADIUS_BITS 27
+#define POSITION_LIMIT 4.6e18 /* units; below 2^62 */
+
+ascc_scale ascc_scale_for_radius(double largest_radius)
+{
+    int exponent;
+    (void)frexp(largest_radius, &exponent); /* largest_radius <= 2^exponent */
+    const ascc_scale scale = {ldexp(1.0, exponent - RADIUS_BITS),
+                              ldexp(1.0, RADIUS_BITS - exponent)};
+    return scale;
+}
+
+bool ascc_scale_apply(const ascc_scale *scale, double length, int64_t *units)
+{
+    const double u = rint(length * scale->inverse);
+    if (!(fabs(u) < POSITION_LIMIT))
+        return false;
+    *units = (int64_t)u;
+    return true;
+}
+
+bool ascc_points_take(ascc_points *points, ascc_arena *arena, size_t count)
+{
+    points->count = count;
+    for (int c = 0; c < 3; c++) {
+        points->position[c] = ascc_arena_take(arena, count, sizeof(int64_t));
+        points->low[c] = ascc_arena_take(arena, count, sizeof(int32_t));
+        if (!points->position[c] || !points->low[c])
+            return false;
+    }
+    return true;
+}
+
+void ascc_extent_start(ascc_extent *extent)
+{
+    for (int c = 0; c < 3; c++) {
+        extent->low[c] = INT64_MAX;
+        extent->high[c] = INT64_MIN;
+    }
+}
+
+void ascc_extent_add(ascc_extent *extent, const ascc_points *points)
+{
+    for (int c = 0; c < 3; c++)
+        for (size_t i = 0; i < points->count; i++) {
+            const int64_t p = points->position[c][i];
+            if (p < extent->low[c])
+                extent->low[c] = p;
+            if (p > extent->high[c])
+                extent->high[c] = p;
+        }
+}
+
+/* ---- Cells ---- */
+
+/* World-anchored cell of a coordinate. Monotone, so neighbours within cell * (1 - 2^-12) are at most
+ * one cell apart in spite of rounding. */
+static inline int64_t cell_of(int64_t position, double inverse_cell)
+{
+    return (int64_t)floor((double)position * inverse_cell);
+}
+
+double ascc_grid_cell(double radius)
+{
+    return radius * (1.0 + 1.0 / 2048.0) + 1.0;
+}
+
+static int bits_for(uint64_t largest)
+{
+    int bits = 1;
+    while (bits < 64 && largest >> bits)
+        bits++;
+    return bits;
+}
+
+/* Where keys start and how they are packed; cells have a margin of one on every side. False if they do
+ * not fit 64 bits. */
+static bool key_layout(ascc_grid *grid, const ascc_extent *extent, int *bits)
+{
+    const double inverse = 1.0 / grid->cell;
+    int width[3];
+    for (int c = 0; c < 3; c++) {
+        if (extent->low[c] > extent->high[c]) { /* no points at all */
+            grid->base[c] = 0;
+            width[c] = 2;
+            continue;
+        }
+        grid->base[c] = cell_of(extent->low[c], inverse) - 1;
+        width[c] = bits_for((uint64_t)(cell_of(extent->high[c], inverse) + 1 - grid->base[c]));
+    }
+    grid->flat = extent->low[2] >= extent->high[2];
+    grid->shift_y = width[0];
+    grid->shift_z = width[0] + width[1];
+    *bits = width[0] + width[1] + width[2];
+    return *bits <= 64 && grid->shift_z < 64;
+}
+
+static inline uint64_t key_of(const ascc_grid *grid, const int64_t cell[3])
+{
+    return (uint64_t)(cell[0] - grid->base[0]) |
+           (uint64_t)(cell[1] - grid->base[1]) << grid->shift_y |
+           (uint64_t)(cell[2] - grid->base[2]) << grid->shift_z;
+}
+
+typedef struct key_job {
+    const ascc_points *points;
+    const ascc_grid *grid;
+    uint64_t *key;
+} key_job;
+
+static void make_keys(void *data, size_t begin, size_t end, int32_t slot)
+{
+    (void)slot;
+    const key_job *job = data;
+    const double inverse = 1.0 / job->grid->cell;
+    for (size_t i = begin; i < end; i++) {
+        const int64_t cell[3] = {cell_of(job->points->position[0][i], inverse),
+                                 cell_of(job->points->position[1][i], inverse),
+                                 cell_of(job->points->position[2][i], inverse)};
+        job->key[i] = key_of(job->grid, cell);
+    }
+}
+
+#define DIGIT_BITS 11
+#define DIGITS (1u << DIGIT_BITS)
+
+/* Stable radix sort of (key, order) pairs by the low `bits` of key; the spare arrays are scratch.
+ * Returns the arrays that hold the result through the pointers. */
+static void radix_sort(uint64_t **key, uint32_t **order, uint64_t **spare_key,
+                       uint32_t **spare_order, size_t count, int bits, uint32_t *histogram)
+{
+    for (int shift = 0; shift < bits; shift += DIGIT_BITS) {
+        memset(histogram, 0, DIGITS * sizeof *histogram);
+        for (size_t i = 0; i < count; i++)
+            histogram[(*key)[i] >> shift & (DIGITS - 1)]++;
+        uint32_t sum = 0;
+        for (size_t d = 0; d < DIGITS; d++) {
+            const uint32_t n = histogram[d];
+            histogram[d] = sum;
+            sum += n;
+        }
+        for (size_t i = 0; i < count; i++) {
+            const uint32_t to = histogram[(*key)[i] >> shift & (DIGITS - 1)]++;
+            (*spare_key)[to] = (*key)[i];
+            (*spare_order)[to] = (*order)[i];
+        }
+        uint64_t *swap_key = *key;
+        uint32_t *swap_order = *order;
+        *key = *spare_key;
+        *order = *spare_order;
+        *spare_key = swap_key;
+        *spare_order = swap_order;
+    }
+}
+
+/* Keys of all points and their rows, sorted by key, rows ascending within a key. */
+static ascc_status sort_by_cell(ascc_grid *grid, const ascc_search_tools *tools,
+                                const ascc_points *points, const ascc_extent *extent,
+                                uint64_t **key, uint32_t **order)
+{
+    int bits;
+    if (points->count >= UINT32_MAX)
+        return ascc_fail(tools->message, ASCC_ERROR_RANGE, "%zu points are too many for one set",
+                         points->count);
+    if (!key_layout(grid, extent, &bits))
+        return ascc_fail(tools->message, ASCC_ERROR_RANGE,
+                         "the points span too many cells of %g units to number them", grid->cell);
+    const size_t count = points->count;
+    uint64_t *spare_key = ascc_arena_take(tools->arena, count, sizeof(uint64_t));
+    uint32_t *spare_order = ascc_arena_take(tools->arena, count, sizeof(uint32_t));
+    uint32_t *histogram = ascc_arena_take(tools->arena, DIGITS, sizeof(uint32_t));
+    *key = ascc_arena_take(tools->arena, count, sizeof(uint64_t));
+    *order = ascc_arena_take(tools->arena, count, sizeof(uint32_t));
+    if (!spare_key || !spare_order || !histogram || !*key || !*order)
+        return ascc_fail(tools->message, ASCC_ERROR_MEMORY, "no memory to sort %zu points", count);
+    key_job job = {points, grid, *key};
+    ascc_workers_run(tools->workers, count, 4096, make_keys, &job);
+    for (size_t i = 0; i < count; i++)
+        (*order)[i] = (uint32_t)i;
+    radix_sort(key, order, &spare_key, &spare_order, count, bits, histogram);
+    return ASCC_OK;
+}
+
+/* ---- Order within a cell ---- */
+
+static bool precedes(const ascc_points *p, uint32_t a, uint32_t b)
+{
+    for (int c = 2; c >= 0; c--)
+        if (p->position[c][a] != p->position[c][b])
+            return p->position[c][a] < p->position[c][b];
+    return a < b;
+}
+
+static void sift(const ascc_points *p, uint32_t *order, size_t root, size_t count)
+{
+    for (;;) {
+        size_t child = 2 * root + 1;
+        if (child >= count)
+            return;
+        if (child + 1 < count && precedes(p, order[child], order[child + 1]))
+            child++;
+        if (!precedes(p, order[root], order[child]))
+            return;
+        const uint32_t swap = order[root];
+        order[root] = order[child];
+        order[child] = swap;
+        root = child;
+    }
+}
+
+/* Sorts by position, then by row: insertion for the usual handful, a heap for a crowd. */
+static void sort_cell(const ascc_points *p, uint32_t *order, size_t count)
+{
+    if (count <= 32) {
+        for (size_t i = 1; i < count; i++) {
+            const uint32_t moved = order[i];
+            size_t j = i;
+            for (; j > 0 && precedes(p, moved, order[j - 1]); j--)
+                order[j] = order[j - 1];
+            order[j] = moved;
+        }
+        return;
+    }
+    for (size_t i = count / 2; i-- > 0;)
+        sift(p, order, i, count);
+    for (size_t i = count - 1; i > 0; i--) {
+        const uint32_t swap = order[0];
+        order[0] = order[i];
+        order[i] = swap;
+        sift(p, order, 0, i);
+    }
+}
+
+ascc_status ascc_points_order(const ascc_search_tools *tools, const ascc_points *points,
+                              const ascc_extent *extent, double cell, uint32_t *order)
+{
+    ascc_grid grid = {.cell = cell};
+    uint64_t *key;
+    uint32_t *sorted;
+    const ascc_status status = sort_by_cell(&grid, tools, points, extent, &key, &sorted);
+    if (status != ASCC_OK)
+        return status;
+    for (size_t i = 0; i < points->count;) {
+        size_t end = i + 1;
+        while (end < points->count && key[end] == key[i])
+            end++;
+        sort_cell(points, sorted + i, end - i);
+        i = end;
+    }
+    memcpy(order, sorted, points->count * sizeof *order);
+    return ASCC_OK;
+}
+
+ascc_status ascc_grid_build(ascc_grid *grid, const ascc_search_tools *tools,
+                            const ascc_points *points, const ascc_extent *extent, double radius,
+                            bool sorted)
+{
+    const size_t count = points->count;
+    uint64_t *key;
+    uint32_t *order;
+    grid->count = count;
+    grid->cell = ascc_grid_cell(radius);
+    if (sorted) {
+        int bits;
+        if (!key_layout(grid, extent, &bits))
+            return ascc_fail(tools->message, ASCC_ERROR_RANGE,
+                             "the points span too many cells of %g units to number them",
+                             grid->cell);
+        key = ascc_arena_take(tools->arena, count, sizeof *key);
+        if (!key)
+            return ascc_fail(tools->message, ASCC_ERROR_MEMORY, "no memory for %zu cells", count);
+        key_job job = {points, grid, key};
+        ascc_workers_run(tools->workers, count, 4096, make_keys, &job);
+        grid->order = NULL;
+        for (int c = 0; c < 3; c++)
+            grid->low[c] = points->low[c];
+    } else {
+        const ascc_status status = sort_by_cell(grid, tools, points, extent, &key, &order);
+        if (status != ASCC_OK)
+            return status;
+        grid->order = order;
+        for (int c = 0; c < 3; c++) {
+            grid->low[c] = ascc_arena_take(tools->arena, count, sizeof(int32_t));
+            if (!grid->low[c])
+                return ascc_fail(tools->message, ASCC_ERROR_MEMORY, "no memory for %zu points",
+                                 count);
+            for (size_t s = 0; s < count; s++)
+                grid->low[c][s] = points->low[c][order[s]];
+        }
+    }
+    /* Keys are compacted in place: the cell list never overtakes the point list. */
+    grid->start = ascc_arena_take(tools->arena, count + 1, sizeof *grid->start);
+    if (!grid->start)
+        return ascc_fail(tools->message, ASCC_ERROR_MEMORY, "no memory for %zu cells", count);
+    size_t cells = 0;
+    for (size_t s = 0; s < count; s++)
+        if (s == 0 || key[s] != key[cells - 1]) {
+            grid->start[cells] = (uint32_t)s;
+            key[cells++] = key[s];
+        }
+    grid->start[cells] = (uint32_t)count;
+    grid->key = key;
+    grid->cell_count = cells;
+    return ASCC_OK;
+}
+
+/* First occupied cell whose key is not below `key`, looking from `from` on: steps of growing length,
+ * then halves, since the wanted cell is mostly near. */
+static size_t cell_at(const ascc_grid *grid, size_t from, uint64_t key)
+{
+    size_t low = from, step = 1;
+    while (low + step < grid->cell_count && grid->key[low + step] < key) {
+        low += step;
+        step *= 2;
+    }
+    size_t high = ascc_min_size(low + step, grid->cell_count);
+    while (low < high) {
+        const size_t middle = low + (high - low) / 2;
+        if (grid->key[middle] < key)
+            low = middle + 1;
+        else
+            high = middle;
+    }
+    return low;
+}
+
+/* ---- Rows ---- */
+
+/* How many candidates are looked at between two checks for a crowd. */
+#define SEARCH_CHUNK 1024
+
+ascc_status ascc_rows_open(ascc_rows *rows, const ascc_search_tools *tools, size_t expected)
+{
+    const size_t count = rows->query->count;
+    rows->used = rows->capacity = 0;
+    rows->longest = 0;
+    rows->count = ascc_arena_take(tools->arena, count, sizeof *rows->count);
+    rows->start = ascc_arena_take(tools->arena, count, sizeof *rows->start);
+    if (!rows->count || !rows->start)
+        return ascc_fail(tools->message, ASCC_ERROR_MEMORY, "no memory for %zu neighbour rows",
+                         count);
+    for (size_t i = 0; i < count; i++)
+        rows->count[i] = ASCC_ROW_ABSENT;
+    rows->neighbor = NULL;
+    memset(&rows->pairs, 0, sizeof rows->pairs);
+    rows->capacity = expected;
+    return ASCC_OK;
+}
+
+static float *grow_floats(ascc_arena *arena, const float *from, size_t used, size_t capacity)
+{
+    float *to = ascc_arena_take(arena, capacity, sizeof *to);
+    if (to && used)
+        memcpy(to, from, used * sizeof *to);
+    return to;
+}
+
+/* Room for `capacity` neighbours, the `used` ones kept. */
+static bool rows_reserve(ascc_rows *rows, ascc_arena *arena, size_t capacity)
+{
+    uint32_t *neighbor = ascc_arena_take(arena, capacity, sizeof *neighbor);
+    if (!neighbor)
+        return false;
+    if (rows->used)
+        memcpy(neighbor, rows->neighbor, rows->used * sizeof *neighbor);
+    ascc_pairs pairs = {0};
+    if (rows->mapping >= 0) {
+        pairs.x = grow_floats(arena, rows->pairs.x, rows->used, capacity);
+        pairs.y = grow_floats(arena, rows->pairs.y, rows->used, capacity);
+        pairs.z = grow_floats(arena, rows->pairs.z, rows->used, capacity);
+        if (!pairs.x || !pairs.y || !pairs.z)
+            return false;
+        for (int w = 0; w < 3; w++)
+            if (rows->wants_window[w]) {
+                pairs.window[w] = grow_floats(arena, rows->pairs.window[w], rows->used, capacity);
+                if (!pairs.window[w])
+                    return false;
+            }
+    }
+    rows->neighbor = neighbor;
+    rows->pairs = pairs;
+    rows->capacity = capacity;
+    return true;
+}
+
+typedef struct rows_job {
+    ascc_rows *rows;
+    const ascc_search_tools *tools;
+    const uint8_t *wanted;
+    uint32_t *scratch; /* [slots][scratch_size] */
+    uint32_t
+        *cut_row; /* [query count], with a limit: the last neighbour kept, by (distance, row) */
+    float *cut;
+    size_t scratch_size;
+    atomic_size_t used;
+    atomic_uint crowded; /* 1 + a query row with too many neighbours */
+    atomic_uint longest;
+} rows_job;
+
+static void low_words(const ascc_points *points, size_t row, int32_t at[3])
+{
+    for (int c = 0; c < 3; c++)
+        at[c] = points->low[c][row];
+}
+
+/* Squared distance, the same bits as the search kernel's. */
+static float squared_distance(const int32_t a[3], const ascc_points *points, uint32_t row)
+{
+    float d[3];
+    for (int c = 0; c < 3; c++)
+        d[c] = (float)(int32_t)((uint32_t)points->low[c][row] - (uint32_t)a[c]);
+    return d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
+}
+
+static bool farther(float a, uint32_t a_row, float b, uint32_t b_row)
+{
+    return a > b || (a == b && a_row > b_row);
+}
+
+/* Drops all but the `limit` nearest of found[count], coincident ones and the query itself kept apart:
+ * the query does not count. Order is kept. Tells the last one kept. */
+static size_t keep_nearest(const ascc_rows *rows, const int32_t at[3], uint32_t query,
+                           uint32_t *found, size_t count, float *cut, uint32_t *cut_row)
+{
+    *cut = INFINITY;
+    *cut_row = UINT32_MAX;
+    for (;;) { /* drop the farthest until few enough are left */
+        size_t others = 0, worst = 0;
+        float worst_distance = -1.0f;
+        for (size_t k = 0; k < count; k++) {
+            if (rows->same && found[k] == query)
+                continue;
+            others++;
+            const float d = squared_distance(at, rows->source, found[k]);
+            if (worst_distance < 0.0f || farther(d, found[k], worst_distance, found[worst])) {
+                worst_distance = d;
+                worst = k;
+            }
+        }
+        if (others <= (size_t)rows->limit) {
+            if (others == (size_t)rows->limit) {
+                *cut = worst_distance;
+                *cut_row = found[worst];
+            }
+            return count;
+        }
+        memmove(found + worst, found + worst + 1, (count - worst - 1) * sizeof *found);
+        count--;
+    }
+}
+
+/* Appends the neighbours of one query within a run of slots; false when there are too many. */
+static bool search_run(const rows_job *job, size_t begin, size_t end, const int32_t at[3],
+                       uint32_t query, uint32_t *found, size_t *count)
+{
+    const ascc_rows *rows = job->rows;
+    const ascc_grid *grid = rows->source_grid;
+    const ascc_coordinates points = {grid->low[0], grid->low[1], grid->low[2]};
+    const float limit = (float)(rows->radius * rows->radius);
+    while (begin < end) {
+        const size_t stop = ascc_min_size(end, begin + SEARCH_CHUNK);
+        const size_t n = job->tools->kernels->search(&points, begin, stop, at[0], at[1], at[2],
+                                                     limit, found + *count);
+        uint32_t *fresh = found + *count;
+        size_t kept = 0;
+        for (size_t k = 0; k < n; k++) {
+            const uint32_t row = grid->order ? grid->order[fresh[k]] : fresh[k];
+            if (rows->skip_self && rows->source->low[0][row] == at[0] &&
+                rows->source->low[1][row] == at[1] && rows->source->low[2][row] == at[2])
+                continue;
+            fresh[kept++] = row;
+        }
+        *count += kept;
+        if (*count > (size_t)rows->max_neighbors) {
+            if (!rows->limit)
+                return false;
+            float cut;
+            uint32_t cut_row;
+            *count = keep_nearest(rows, at, query, found, *count, &cut, &cut_row);
+        }
+        begin = stop;
+    }
+    return true;
+}
+
+/* Puts a finished row at its place, geometry included. */
+static void store_row(rows_job *job, size_t query, const uint32_t *found, size_t count)
+{
+    ascc_rows *rows = job->rows;
+    const size_t start = atomic_fetch_add_explicit(&job->used, count, memory_order_relaxed);
+    if (start + count > rows->capacity)
+        return; /* made again when there is room */
+    memcpy(rows->neighbor + start, found, count * sizeof *found);
+    rows->start[query] = start;
+    rows->count[query] = (uint32_t)count;
+    unsigned longest = atomic_load_explicit(&job->longest, memory_order_relaxed);
+    while (longest < count &&
+           !atomic_compare_exchange_weak_explicit(&job->longest, &longest, (unsigned)count,
+                                                  memory_order_relaxed, memory_order_relaxed))
+        ;
+    if (rows->mapping < 0)
+        return;
+    ascc_pairs at = {rows->pairs.x + start, rows->pairs.y + start, rows->pairs.z + start, {0}};
+    for (int w = 0; w < 3; w++)
+        at.window[w] = rows->pairs.window[w] ? rows->pairs.window[w] + start : NULL;
+    const ascc_coordinates source = {rows->source->low[0], rows->source->low[1],
+                                     rows->source->low[2]};
+    int32_t here[3];
+    low_words(rows->query, query, here);
+    job->tools->kernels->geometry(&source, rows->neighbor + start, count, here[0], here[1], here[2],
+                                  (float)(1.0 / rows->radius), rows->mapping, &at);
+}
+
+typedef struct run {
+    size_t cell; /* where the last search for this row of cells ended */
+    size_t begin, end;
+} run;
+
+/* The runs of source slots around a query cell. */
+static int find_runs(const ascc_rows *rows, uint64_t key, run *runs)
+{
+    const ascc_grid *grid = rows->source_grid;
+    const int reach = grid->flat ? 0 : 1;
+    int n = 0;
+    for (int dz = -reach; dz <= reach; dz++)
+        for (int dy = -1; dy <= 1; dy++, n++) {
+            const uint64_t middle = key + ((uint64_t)(int64_t)dz << grid->shift_z) +
+                                    ((uint64_t)(int64_t)dy << grid->shift_y);
+            const size_t first = cell_at(grid, runs[n].cell, middle - 1);
+            size_t last = first;
+            while (last < grid->cell_count && grid->key[last] <= middle + 1)
+                last++;
+            runs[n].cell = first;
+            runs[n].begin = grid->start[first];
+            runs[n].end = grid->start[last];
+        }
+    return n;
+}
+
+static bool row_wanted(const rows_job *job, size_t row)
+{
+    return job->rows->count[row] == ASCC_ROW_ABSENT && (!job->wanted || job->wanted[row]);
+}
+
+/* Rows of the queries in cells [begin, end). */
+static void make_rows(void *data, size_t begin, size_t end, int32_t slot)
+{
+    rows_job *job = data;
+    ascc_rows *rows = job->rows;
+    const ascc_grid *grid = rows->query_grid;
+    uint32_t *found = job->scratch + (size_t)slot * job->scratch_size;
+    run runs[9] = {0};
+    for (size_t c = begin; c < end; c++) {
+        int n = 0;
+        for (size_t s = grid->start[c]; s < grid->start[c + 1]; s++) {
+            const size_t row = grid->order ? grid->order[s] : s;
+            if (!row_wanted(job, row))
+                continue;
+            if (n == 0)
+                n = find_runs(rows, grid->key[c], runs);
+            int32_t at[3];
+            low_words(rows->query, row, at);
+            size_t count = 0;
+            for (int r = 0; r < n; r++)
+                if (!search_run(job, runs[r].begin, runs[r].end, at, (uint32_t)row, found,
+                                &count)) {
+                    atomic_store_explicit(&job->crowded, (unsigned)row + 1, memory_order_relaxed);
+                    return;
+                }
+            if (rows->limit)
+                count = keep_nearest(rows, at, (uint32_t)row, found, count, &job->cut[row],
+                                     &job->cut_row[row]);
+            store_row(job, row, found, count);
+        }
+    }
+}
+
+/* One pass over all query cells; the rows that did not fit are left absent. */
+static ascc_status rows_pass(rows_job *job)
+{
+    const ascc_rows *rows = job->rows;
+    atomic_store(&job->used, rows->used);
+    ascc_workers_run(job->tools->workers, rows->query_grid->cell_count, 32, make_rows, job);
+    const unsigned crowded = atomic_load(&job->crowded);
+    if (crowded)
+        return ascc_fail(job->tools->message, ASCC_ERROR_LIMIT,
+                         "a point has more than max_neighbors = %d neighbours",
+                         rows->max_neighbors);
+    return ASCC_OK;
+}
+
+/* Keeps a neighbour only if both sides kept each other, so that the relation stays symmetric. */
+static void drop_one_sided(void *data, size_t begin, size_t end, int32_t slot)
+{
+    (void)slot;
+    const rows_job *job = data;
+    ascc_rows *rows = job->rows;
+    for (size_t i = begin; i < end; i++) {
+        uint32_t *neighbor = rows->neighbor + rows->start[i];
+        int32_t at[3];
+        low_words(rows->query, i, at);
+        size_t kept = 0;
+        for (size_t k = 0; k < rows->count[i]; k++) {
+            const uint32_t j = neighbor[k];
+            const float d = squared_distance(at, rows->source, j);
+            if (j != i && farther(d, (uint32_t)i, job->cut[j], job->cut_row[j]))
+                continue;
+            for (int w = 0; rows->mapping >= 0 && w < 3; w++)
+                if (rows->pairs.window[w])
+                    rows->pairs.window[w][rows->start[i] + kept] =
+                        rows->pairs.window[w][rows->start[i] + k];
+            if (rows->mapping >= 0) {
+                rows->pairs.x[rows->start[i] + kept] = rows->pairs.x[rows->start[i] + k];
+                rows->pairs.y[rows->start[i] + kept] = rows->pairs.y[rows->start[i] + k];
+                rows->pairs.z[rows->start[i] + kept] = rows->pairs.z[rows->start[i] + k];
+            }
+            neighbor[kept++] = j;
+        }
+        rows->count[i] = (uint32_t)kept;
+    }
+}
+
+ascc_status ascc_rows_make(ascc_rows *rows, const ascc_search_tools *tools, const uint8_t *wanted)
+{
+    const bool mutual = rows->limit && rows->same;
+    if (mutual) { /* whom a row keeps depends on all other rows */
+        wanted = NULL;
+        if (rows->neighbor)
+            return ASCC_OK;
+    }
+    const size_t slots = (size_t)ascc_workers_count(tools->workers);
+    rows_job job = {.rows = rows, .tools = tools, .wanted = wanted};
+    job.scratch_size = (size_t)rows->max_neighbors + SEARCH_CHUNK + 32;
+    job.scratch = ascc_arena_take(tools->arena, slots * job.scratch_size, sizeof *job.scratch);
+    if (rows->limit) {
+        job.cut = ascc_arena_take(tools->arena, rows->query->count, sizeof *job.cut);
+        job.cut_row = ascc_arena_take(tools->arena, rows->query->count, sizeof *job.cut_row);
+    }
+    if (!job.scratch || (rows->limit && (!job.cut || !job.cut_row)))
+        return ascc_fail(tools->message, ASCC_ERROR_MEMORY, "no memory for a neighbour search");
+    if (!rows->neighbor && !rows_reserve(rows, tools->arena, rows->capacity))
+        return ascc_fail(tools->message, ASCC_ERROR_MEMORY, "no memory for %zu neighbours",
+                         rows->capacity);
+    ascc_status status = rows_pass(&job);
+    size_t needed = atomic_load(&job.used);
+    while (status == ASCC_OK && needed > rows->capacity) {
+        rows->used = rows->capacity; /* whole rows below it are kept, with holes at the end */
+        if (!rows_reserve(rows, tools->arena, needed + needed / 8 + rows->capacity))
+            return ascc_fail(tools->message, ASCC_ERROR_MEMORY, "no memory for %zu neighbours",
+                             needed);
+        status = rows_pass(&job);
+        needed = atomic_load(&job.used);
+    }
+    if (status != ASCC_OK)
+        return status;
+    rows->used = needed;
+    rows->longest = (uint32_t)ascc_max_size(rows->longest, atomic_load(&job.longest));
+    if (mutual)
+        ascc_workers_run(tools->workers, rows->query->count, 256, drop_one_sided, &job);
+    return ASCC_OK;
+}

@@ -1,0 +1,508 @@
+/* Layer by layer: which rows are needed, which neighbours they have, what they are worth.
+ * SPDX-License-Identifier: MIT */
+#include "network.h"
+
+#include <string.h>
+
+#define WANTS_RAW 1
+#define WANTS_RECTIFIED 2
+
+/* Rows that are computed together: their columns share one pass over the weights. */
+#define TILE_ROWS 16
+/* Floats between the columns of a tile beyond their length, so that they do not collide in the cache. */
+#define COLUMN_PADDING 16
+
+#if defined(__GNUC__)
+#define MARK(flag) __atomic_store_n(&(flag), (uint8_t)1, __ATOMIC_RELAXED)
+#else
+#define MARK(flag) ((flag) = 1)
+#endif
+
+int32_t ascc_network_set(const ascc_network *network, int32_t value)
+{
+    return value < 2 ? value : network->plan->layer[value - 2].set;
+}
+
+int32_t ascc_network_channels(const ascc_network *network, int32_t value)
+{
+    const ascc_plan *plan = network->plan;
+    return value == 0   ? plan->fluid_channels
+           : value == 1 ? plan->boundary_channels
+                        : plan->layer[value - 2].channels;
+}
+
+static size_t cell_count(const ascc_filter *filter)
+{
+    return (size_t)filter->cells[0] * (size_t)filter->cells[1] * (size_t)filter->cells[2];
+}
+
+/* ---- Prepared once ---- */
+
+static int32_t find_key(ascc_network *network, int32_t query, int32_t source,
+                        const ascc_filter *filter, bool skip_self)
+{
+    ascc_rows_key wanted = {.query = query,
+                            .source = source,
+                            .skip_self = skip_self,
+                            .limit = filter->neighbor_limit,
+                            .mapping = (int32_t)filter->mapping,
+                            .radius = filter->radius};
+    int32_t k = 0;
+    for (; k < network->key_count; k++) {
+        const ascc_rows_key *key = &network->key[k];
+        if (key->query == query && key->source == source && key->skip_self == wanted.skip_self &&
+            key->limit == wanted.limit && key->mapping == wanted.mapping &&
+            key->radius == wanted.radius)
+            break;
+    }
+    if (k == network->key_count)
+        network->key[network->key_count++] = wanted;
+    network->key[k].window[filter->window] = 1;
+    return k;
+}
+
+/* [cell][input][output] to [cell][output][padded input]: what the pair kernel reads in a row. */
+static void arrange_output(const ascc_network *network, size_t cells)
+{
+    const ascc_output *output = &network->plan->output;
+    const size_t a = (size_t)output->inputs, b = (size_t)network->plan->dimension;
+    const size_t padded = (size_t)network->output_inputs;
+    memset(network->output_weight, 0, network->output_weight_count * sizeof(float));
+    for (size_t c = 0; c < cells; c++)
+        for (size_t i = 0; i < a; i++)
+            for (size_t o = 0; o < b; o++)
+                network->output_weight[(c * b + o) * padded + i] =
+                    output->weight[(c * a + i) * b + o];
+}
+
+ascc_status ascc_network_create(ascc_network *network, const ascc_allocator *allocator,
+                                const ascc_plan *plan, int32_t max_neighbors, ascc_message *message)
+{
+    memset(network, 0, sizeof *network);
+    network->allocator = allocator;
+    network->plan = plan;
+    network->value_count = plan->layer_count + 2;
+    network->max_neighbors = max_neighbors;
+    const size_t terms = (size_t)plan->term_count + 1;
+    const ascc_output *output = &plan->output;
+    const bool antisymmetric = output->kind == ASCC_OUTPUT_ANTISYMMETRIC;
+    network->key = ascc_allocate(allocator, terms, sizeof *network->key);
+    network->term_key = ascc_allocate(allocator, terms, sizeof *network->term_key);
+    network->wants = ascc_allocate(allocator, (size_t)network->value_count, 1);
+    if (antisymmetric) {
+        network->output_inputs = (output->inputs + 7) / 8 * 8;
+        network->output_weight_count =
+            cell_count(&output->filter) * (size_t)network->output_inputs * (size_t)plan->dimension;
+        network->output_weight =
+            ascc_allocate(allocator, network->output_weight_count, sizeof(float));
+    }
+    if (!network->key || !network->term_key || !network->wants ||
+        (antisymmetric && !network->output_weight)) {
+        ascc_network_destroy(network);
+        return ascc_fail(message, ASCC_ERROR_MEMORY, "no memory to prepare the network");
+    }
+    memset(network->wants, 0, (size_t)network->value_count);
+    for (int32_t l = 0; l < plan->layer_count; l++)
+        for (int32_t t = plan->layer[l].first_term;
+             t < plan->layer[l].first_term + plan->layer[l].term_count; t++) {
+            const ascc_term *term = &plan->term[t];
+            network->wants[term->source] |= term->rectify ? WANTS_RECTIFIED : WANTS_RAW;
+            network->term_key[t] =
+                term->kind != ASCC_TERM_CONVOLUTION
+                    ? -1
+                    : find_key(network, plan->layer[l].set, ascc_network_set(network, term->source),
+                               &term->filter, term->filter.skip_self);
+        }
+    network->wants[output->source] |= output->rectify ? WANTS_RECTIFIED : WANTS_RAW;
+    network->term_key[plan->term_count] = -1;
+    if (antisymmetric) {
+        const int32_t set = ascc_network_set(network, output->source);
+        network->term_key[plan->term_count] = find_key(network, set, set, &output->filter, false);
+        arrange_output(network, cell_count(&output->filter));
+    }
+    return ASCC_OK;
+}
+
+void ascc_network_destroy(ascc_network *network)
+{
+    const ascc_allocator *a = network->allocator;
+    if (!a)
+        return;
+    const size_t terms = (size_t)network->plan->term_count + 1;
+    ascc_release(a, network->key, terms, sizeof *network->key);
+    ascc_release(a, network->term_key, terms, sizeof *network->term_key);
+    ascc_release(a, network->wants, (size_t)network->value_count, 1);
+    ascc_release(a, network->output_weight, network->output_weight_count, sizeof(float));
+    memset(network, 0, sizeof *network);
+}
+
+/* ---- Backwards: demand ---- */
+
+static ascc_status open_rows(ascc_network_run *run)
+{
+    const ascc_network *network = run->network;
+    ascc_hierarchy *h = run->hierarchy;
+    for (int32_t k = 0; k < network->key_count; k++) {
+        const ascc_rows_key *key = &network->key[k];
+        ascc_rows *rows = &run->rows[k];
+        memset(rows, 0, sizeof *rows);
+        rows->query = &h->set[key->query];
+        rows->source = &h->set[key->source];
+        rows->radius = key->radius * h->scale.inverse;
+        rows->same = key->query == key->source;
+        rows->skip_self = key->skip_self;
+        rows->limit = key->limit;
+        rows->max_neighbors = network->max_neighbors;
+        rows->mapping = key->mapping;
+        for (int w = 0; w < 3; w++)
+            rows->wants_window[w] = w > 0 && key->window[w];
+        ascc_status status =
+            ascc_hierarchy_grid(h, run->tools, key->query, rows->radius, &rows->query_grid);
+        if (status == ASCC_OK)
+            status =
+                ascc_hierarchy_grid(h, run->tools, key->source, rows->radius, &rows->source_grid);
+        if (status == ASCC_OK)
+            status = ascc_rows_open(rows, run->tools,
+                                    ascc_max_size(key->expected, rows->query->count * 8));
+        if (status != ASCC_OK)
+            return status;
+    }
+    return ASCC_OK;
+}
+
+static bool take_active(ascc_network_run *run)
+{
+    const ascc_network *network = run->network;
+    for (int32_t v = 0; v < network->value_count; v++) {
+        const size_t count = run->hierarchy->set[ascc_network_set(network, v)].count;
+        run->value[v].active = ascc_arena_take(run->tools->arena, count, 1);
+        if (!run->value[v].active)
+            return false;
+        memset(run->value[v].active, 0, count);
+    }
+    return true;
+}
+
+/* The row of `to` that is the same particle as this row of `from`; false if there is none. */
+static bool shared_row(const ascc_hierarchy *h, int32_t from, int32_t to, size_t row,
+                       size_t *shared)
+{
+    *shared = row;
+    if (from == to)
+        return true;
+    if (from == ASCC_SET_ALL && to < ASCC_SET_ALL) {
+        const bool fluid = h->origin[row] < h->fluid_count;
+        *shared = h->part[row];
+        return fluid == (to == ASCC_SET_FLUID);
+    }
+    if (from < ASCC_SET_ALL && to == ASCC_SET_ALL) {
+        *shared = h->whole[from][row];
+        return true;
+    }
+    return false;
+}
+
+typedef struct mark_job {
+    const ascc_rows *rows;
+    const uint8_t *active;
+    uint8_t *source;
+} mark_job;
+
+static void mark_neighbors(void *data, size_t begin, size_t end, int32_t slot)
+{
+    (void)slot;
+    const mark_job *job = data;
+    const ascc_rows *rows = job->rows;
+    for (size_t i = begin; i < end; i++)
+        if (job->active[i])
+            for (uint32_t k = 0; k < rows->count[i]; k++)
+                MARK(job->source[rows->neighbor[rows->start[i] + k]]);
+}
+
+/* Makes the rows of the active queries and marks what they read. */
+static ascc_status demand_rows(ascc_network_run *run, int32_t key, const uint8_t *active,
+                               uint8_t *source)
+{
+    ascc_rows *rows = &run->rows[key];
+    const ascc_status status = ascc_rows_make(rows, run->tools, active);
+    if (status != ASCC_OK)
+        return status;
+    mark_job job = {rows, active, source};
+    ascc_workers_run(run->tools->workers, rows->query->count, 1024, mark_neighbors, &job);
+    return ASCC_OK;
+}
+
+static ascc_status demand_output(ascc_network_run *run)
+{
+    const ascc_network *network = run->network;
+    const ascc_output *output = &network->plan->output;
+    const ascc_hierarchy *h = run->hierarchy;
+    const int32_t set = ascc_network_set(network, output->source);
+    uint8_t *active = run->value[output->source].active;
+    for (size_t i = 0; i < h->fluid_count; i++)
+        active[set == ASCC_SET_FLUID ? i : h->whole[ASCC_SET_FLUID][i]] = 1;
+    const int32_t key = network->term_key[network->plan->term_count];
+    if (key < 0)
+        return ASCC_OK;
+    uint8_t *fluid = ascc_arena_take(run->tools->arena, h->set[set].count, 1);
+    if (!fluid)
+        return ascc_fail(run->tools->message, ASCC_ERROR_MEMORY, "no memory for the last layer");
+    memcpy(fluid, active, h->set[set].count);
+    return demand_rows(run, key, fluid, active);
+}
+
+static ascc_status demand_layer(ascc_network_run *run, int32_t l)
+{
+    const ascc_network *network = run->network;
+    const ascc_layer *layer = &network->plan->layer[l];
+    const uint8_t *active = run->value[l + 2].active;
+    const size_t count = run->hierarchy->set[layer->set].count;
+    for (int32_t t = layer->first_term; t < layer->first_term + layer->term_count; t++) {
+        const int32_t source = network->plan->term[t].source;
+        uint8_t *reads = run->value[source].active;
+        if (network->term_key[t] >= 0) {
+            const ascc_status status = demand_rows(run, network->term_key[t], active, reads);
+            if (status != ASCC_OK)
+                return status;
+            continue;
+        }
+        const int32_t set = ascc_network_set(network, source);
+        for (size_t i = 0, j; i < count; i++)
+            if (active[i] && shared_row(run->hierarchy, layer->set, set, i, &j))
+                reads[j] = 1;
+    }
+    return ASCC_OK;
+}
+
+ascc_status ascc_network_demand(ascc_network_run *run, ascc_network *network,
+                                ascc_hierarchy *hierarchy, const ascc_search_tools *tools)
+{
+    memset(run, 0, sizeof *run);
+    run->network = network;
+    run->hierarchy = hierarchy;
+    run->tools = tools;
+    run->value = ascc_arena_take(tools->arena, (size_t)network->value_count, sizeof *run->value);
+    run->rows = ascc_arena_take(tools->arena, (size_t)network->key_count, sizeof *run->rows);
+    if (!run->value || !run->rows)
+        return ascc_fail(tools->message, ASCC_ERROR_MEMORY, "no memory for the network");
+    memset(run->value, 0, (size_t)network->value_count * sizeof *run->value);
+    if (!take_active(run))
+        return ascc_fail(tools->message, ASCC_ERROR_MEMORY, "no memory for the network");
+    ascc_status status = open_rows(run);
+    if (status == ASCC_OK)
+        status = demand_output(run);
+    for (int32_t l = network->plan->layer_count - 1; status == ASCC_OK && l >= 0; l--)
+        status = demand_layer(run, l);
+    for (int32_t k = 0; status == ASCC_OK && k < network->key_count; k++) {
+        const ascc_rows *rows = &run->rows[k];
+        network->key[k].expected = rows->used + rows->used / 8;
+        run->neighbor_count += rows->used;
+        run->longest = rows->longest > run->longest ? rows->longest : run->longest;
+    }
+    return status;
+}
+
+/* ---- Forwards: values ---- */
+
+typedef struct layer_job {
+    const ascc_network_run *run;
+    const ascc_layer *layer;
+    ascc_value *value;
+    float *output; /* the last layer's padded copy, or NULL */
+    size_t output_stride;
+    const uint32_t *list; /* active rows */
+    float *scratch;       /* [slots][scratch_size]: columns, then a tile of the layer */
+    size_t scratch_size, tile_offset;
+} layer_job;
+
+static const float *source_values(const ascc_network_run *run, const ascc_term *term)
+{
+    const ascc_value *value = &run->value[term->source];
+    return term->rectify ? value->rectified : value->raw;
+}
+
+static void add_bias(const ascc_term *term, float *row)
+{
+    for (int32_t c = 0; term->bias && c < term->outputs; c++)
+        row[c] += term->bias[c];
+}
+
+static void convolve_tile(const layer_job *job, const ascc_term *term, const ascc_rows *rows,
+                          const uint32_t *list, size_t n, float *column, float *tile)
+{
+    const ascc_kernels *kernels = job->run->tools->kernels;
+    const size_t a = (size_t)term->inputs, width = (size_t)job->layer->channels;
+    const size_t length = cell_count(&term->filter) * a, stride = length + COLUMN_PADDING;
+    const float *feature = source_values(job->run, term);
+    for (size_t r = 0; r < n; r++) {
+        const size_t start = rows->start[list[r]];
+        const ascc_pairs pairs = {
+            rows->pairs.x + start, rows->pairs.y + start, rows->pairs.z + start, {0}};
+        const float *window = rows->pairs.window[term->filter.window];
+        kernels->gather(&pairs, window ? window + start : NULL, rows->neighbor + start,
+                        rows->count[list[r]], feature, a, term->filter.cells, column + r * stride);
+        add_bias(term, tile + r * width + term->column);
+    }
+    kernels->multiply(column, stride, n, length, term->weight, (size_t)term->outputs,
+                      tile + term->column, width);
+}
+
+/* Dense and residual terms: rows that the source's set shares with the layer's. */
+static void pointwise_tile(const layer_job *job, const ascc_term *term, const uint32_t *list,
+                           size_t n, float *tile)
+{
+    const ascc_network_run *run = job->run;
+    const int32_t set = ascc_network_set(run->network, term->source);
+    const size_t a = (size_t)term->inputs, width = (size_t)job->layer->channels;
+    const float *source = source_values(run, term);
+    for (size_t r = 0, j; r < n; r++) {
+        if (!shared_row(run->hierarchy, job->layer->set, set, list[r], &j))
+            continue;
+        float *row = tile + r * width + term->column;
+        const float *from = source + j * a;
+        if (term->kind == ASCC_TERM_IDENTITY) {
+            for (size_t c = 0; c < a; c++)
+                row[c] += from[c];
+            continue;
+        }
+        add_bias(term, row);
+        run->tools->kernels->multiply(from, a, 1, a, term->weight, (size_t)term->outputs, row,
+                                      width);
+    }
+}
+
+static void store_tile(const layer_job *job, const uint32_t *list, size_t n, const float *tile)
+{
+    const size_t width = (size_t)job->layer->channels;
+    const bool rectify = job->run->network->plan->output.rectify;
+    for (size_t r = 0; r < n; r++) {
+        const float *from = tile + r * width;
+        for (size_t c = 0; job->value->raw && c < width; c++)
+            job->value->raw[list[r] * width + c] = from[c];
+        for (size_t c = 0; job->value->rectified && c < width; c++)
+            job->value->rectified[list[r] * width + c] = from[c] < 0.0f ? 0.0f : from[c];
+        float *padded = job->output ? job->output + list[r] * job->output_stride : NULL;
+        for (size_t c = 0; padded && c < job->output_stride; c++)
+            padded[c] = c >= width || (rectify && from[c] < 0.0f) ? 0.0f : from[c];
+    }
+}
+
+static void compute_tiles(void *data, size_t begin, size_t end, int32_t slot)
+{
+    const layer_job *job = data;
+    const ascc_plan *plan = job->run->network->plan;
+    float *column = job->scratch + (size_t)slot * job->scratch_size;
+    float *tile = column + job->tile_offset;
+    for (size_t at = begin; at < end; at += TILE_ROWS) {
+        const size_t n = ascc_min_size(TILE_ROWS, end - at);
+        const uint32_t *list = job->list + at;
+        memset(tile, 0, n * (size_t)job->layer->channels * sizeof *tile);
+        for (int32_t t = job->layer->first_term;
+             t < job->layer->first_term + job->layer->term_count; t++) {
+            const ascc_term *term = &plan->term[t];
+            const int32_t key = job->run->network->term_key[t];
+            if (key >= 0)
+                convolve_tile(job, term, &job->run->rows[key], list, n, column, tile);
+            else
+                pointwise_tile(job, term, list, n, tile);
+        }
+        store_tile(job, list, n, tile);
+    }
+}
+
+/* Room for a value as its readers want it. */
+static bool take_value(ascc_network_run *run, int32_t v)
+{
+    const size_t rows = run->hierarchy->set[ascc_network_set(run->network, v)].count;
+    const size_t channels = (size_t)ascc_network_channels(run->network, v);
+    ascc_value *value = &run->value[v];
+    if (run->network->wants[v] & WANTS_RAW) {
+        value->raw = ascc_arena_take(run->tools->arena, rows, channels * sizeof(float));
+        if (!value->raw)
+            return false;
+    }
+    if (run->network->wants[v] & WANTS_RECTIFIED) {
+        value->rectified = ascc_arena_take(run->tools->arena, rows, channels * sizeof(float));
+        if (!value->rectified)
+            return false;
+    }
+    const bool last = v == run->network->plan->output.source && run->network->output_inputs > 0;
+    if (!last)
+        return true;
+    run->output = ascc_arena_take(run->tools->arena, rows,
+                                  (size_t)run->network->output_inputs * sizeof(float));
+    return run->output != NULL;
+}
+
+/* Features come in the host's order; values are in the order of the set. */
+static void place_features(ascc_network_run *run, int32_t v, const float *features)
+{
+    const ascc_hierarchy *h = run->hierarchy;
+    const size_t channels = (size_t)ascc_network_channels(run->network, v);
+    const ascc_output *output = &run->network->plan->output;
+    const ascc_value *value = &run->value[v];
+    for (size_t i = 0; i < h->set[v].count; i++) {
+        const size_t row = h->origin[h->whole[v][i]] - (v == 0 ? 0 : h->fluid_count);
+        const float *from = features + row * channels;
+        for (size_t c = 0; c < channels; c++) {
+            const float rectified = from[c] < 0.0f ? 0.0f : from[c];
+            if (value->raw)
+                value->raw[i * channels + c] = from[c];
+            if (value->rectified)
+                value->rectified[i * channels + c] = rectified;
+        }
+        const size_t stride = (size_t)run->network->output_inputs;
+        for (size_t c = 0; v == output->source && c < stride; c++)
+            run->output[i * stride + c] =
+                c >= channels || (output->rectify && from[c] < 0.0f) ? 0.0f : from[c];
+    }
+}
+
+static ascc_status compute_layer(ascc_network_run *run, int32_t l, uint32_t *list)
+{
+    const ascc_plan *plan = run->network->plan;
+    const ascc_layer *layer = &plan->layer[l];
+    const ascc_search_tools *tools = run->tools;
+    size_t longest = 0;
+    for (int32_t t = layer->first_term; t < layer->first_term + layer->term_count; t++)
+        if (plan->term[t].kind == ASCC_TERM_CONVOLUTION)
+            longest = ascc_max_size(
+                longest,
+                cell_count(&plan->term[t].filter) * (size_t)plan->term[t].inputs + COLUMN_PADDING);
+    layer_job job = {.run = run, .layer = layer, .value = &run->value[l + 2], .list = list};
+    const size_t slots = (size_t)ascc_workers_count(tools->workers);
+    job.tile_offset = TILE_ROWS * longest;
+    job.scratch_size = job.tile_offset + TILE_ROWS * (size_t)layer->channels + COLUMN_PADDING;
+    job.scratch = ascc_arena_take(tools->arena, slots * job.scratch_size, sizeof(float));
+    if (!job.scratch || !take_value(run, l + 2))
+        return ascc_fail(tools->message, ASCC_ERROR_MEMORY, "no memory for layer %s", layer->name);
+    if (plan->output.source == l + 2) {
+        job.output = run->output;
+        job.output_stride = (size_t)run->network->output_inputs;
+    }
+    size_t count = 0;
+    const size_t rows = run->hierarchy->set[layer->set].count;
+    for (size_t i = 0; i < rows; i++)
+        if (run->value[l + 2].active[i])
+            list[count++] = (uint32_t)i;
+    ascc_workers_run(tools->workers, count, TILE_ROWS * 4, compute_tiles, &job);
+    return ASCC_OK;
+}
+
+ascc_status ascc_network_forward(ascc_network_run *run, const float *fluid_features,
+                                 const float *boundary_features)
+{
+    const ascc_network *network = run->network;
+    size_t most = 0;
+    for (int s = 0; s < ASCC_MAX_SETS; s++)
+        most = ascc_max_size(most, run->hierarchy->set[s].count);
+    uint32_t *list = ascc_arena_take(run->tools->arena, most, sizeof *list);
+    if (!list || !take_value(run, 0) || !take_value(run, 1))
+        return ascc_fail(run->tools->message, ASCC_ERROR_MEMORY, "no memory for the features");
+    place_features(run, 0, fluid_features);
+    place_features(run, 1, boundary_features);
+    ascc_status status = ASCC_OK;
+    for (int32_t l = 0; status == ASCC_OK && l < network->plan->layer_count; l++)
+        status = compute_layer(run, l, list);
+    return status;
+}

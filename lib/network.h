@@ -1,0 +1,71 @@
+/* Runs a layer plan over a hierarchy: demand backwards, values forwards.
+ * SPDX-License-Identifier: MIT
+ *
+ * Backwards: from the rows of the last layer that fluid particles need, through the neighbour rows, to
+ * the rows of every value that can reach a fluid particle; only those are searched and computed.
+ */
+#ifndef ASCC_NETWORK_H
+#define ASCC_NETWORK_H
+
+#include "hierarchy.h"
+
+/* Which rows a term reads; terms that look alike share them. */
+typedef struct ascc_rows_key {
+    int32_t query, source; /* sets */
+    int32_t skip_self, limit, mapping;
+    int32_t window[3];
+    double radius;   /* m */
+    size_t expected; /* neighbours, from the last step */
+} ascc_rows_key;
+
+/* What depends on the model alone, prepared once. */
+typedef struct ascc_network {
+    const ascc_allocator *allocator;
+    const ascc_plan *plan;
+    int32_t value_count;
+    int32_t key_count;
+    ascc_rows_key *key;   /* [term_count + 1] */
+    int32_t *term_key;    /* [term_count + 1], last: the output; -1 = none */
+    uint8_t *wants;       /* [value_count] WANTS_* */
+    float *output_weight; /* antisymmetric: [cell][dimension][padded inputs] */
+    size_t output_weight_count;
+    int32_t output_inputs; /* padded to a multiple of 8 */
+    int32_t max_neighbors;
+} ascc_network;
+
+ascc_status ascc_network_create(ascc_network *network, const ascc_allocator *allocator,
+                                const ascc_plan *plan, int32_t max_neighbors,
+                                ascc_message *message);
+void ascc_network_destroy(ascc_network *network);
+
+int32_t ascc_network_set(const ascc_network *network, int32_t value);
+int32_t ascc_network_channels(const ascc_network *network, int32_t value);
+
+/* One value in one step; rows that nobody reads hold garbage. */
+typedef struct ascc_value {
+    uint8_t *active;  /* [rows] */
+    float *raw;       /* [rows][channels], NULL if only the rectified are read */
+    float *rectified; /* or NULL */
+} ascc_value;
+
+typedef struct ascc_network_run {
+    ascc_network *network;
+    ascc_hierarchy *hierarchy;
+    const ascc_search_tools *tools;
+    ascc_value *value;
+    ascc_rows *rows; /* [key_count] */
+    float *output;   /* [rows][output_inputs] source of the last layer as it reads it */
+    size_t neighbor_count;
+    uint32_t longest;
+} ascc_network_run;
+
+/* Finds the rows every value needs and searches them. errors: MEMORY, RANGE, LIMIT. */
+ascc_status ascc_network_demand(ascc_network_run *run, ascc_network *network,
+                                ascc_hierarchy *hierarchy, const ascc_search_tools *tools);
+
+/* Computes all values from the features, [host's rows][channels] of fluid and boundary.
+ * errors: MEMORY. */
+ascc_status ascc_network_forward(ascc_network_run *run, const float *fluid_features,
+                                 const float *boundary_features);
+
+#endif
