@@ -101,7 +101,7 @@ static void measure_rows(const ascc_particles *p, const ascc_rows *rows, ascc_me
 static ascc_status measure_density(const ascc_particles *p, ascc_arena *arena, ascc_measures *m,
                                    ascc_message *message)
 {
-    const ascc_search_tools tools = {arena, p->context->workers, &p->context->kernels, &p->message};
+    const ascc_search_tools tools = {arena, p->context->workers, &p->context->kernels, message};
     const double radius = 2.0 * p->spacing;
     const ascc_scale scale = ascc_scale_for_radius(radius);
     ascc_points points;
