@@ -300,7 +300,7 @@ ascc_status ascc_particles_restore(ascc_particles *p, const void *memory, size_t
         return ASCC_ERROR_ARGUMENT;
     if (!memory)
         return ascc_particles_fail(p, ASCC_ERROR_ARGUMENT, "memory: missing");
-    snapshot s;
+    snapshot s = {0};
     ascc_status status = read_header(p, memory, size, &s);
     if (status != ASCC_OK)
         return status;
