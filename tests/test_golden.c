@@ -493,9 +493,9 @@ static void cconv_layers(const char *scene, bool weightless)
     static const struct {
         const char *layer, *tensor;
         size_t column;
-    } values[] = {{"l0", "step1.l0.conv_obstacle", 0}, {"l0", "step1.l0.conv_fluid", 32},
-                  {"l0", "step1.l0.dense_fluid", 64},  {"l1.out", "step1.l1.out", 0},
-                  {"l2.out", "step1.l2.out", 0},       {"l3.out", "step1.l3.out", 0}};
+    } values[] = {{"A0", "step1.l0.conv_obstacle", 0}, {"A0", "step1.l0.conv_fluid", 32},
+                  {"A0", "step1.l0.dense_fluid", 64},  {"A1", "step1.l1.out", 0},
+                  {"A2", "step1.l2.out", 0},           {"A3", "step1.l3.out", 0}};
     network_case n;
     if (!network_open(&n, "cconv", scene, weightless))
         skip();

@@ -115,8 +115,10 @@ static void corners_are_those_of_both_shifted_cells(void **state)
                     for (size_t j = 0; j < s.count; j++)
                         if (fabs((double)s.position[0][j] - at[0]) <= 1.0 &&
                             fabs((double)s.position[1][j] - at[1]) <= 1.0 &&
-                            fabs((double)s.position[2][j] - at[2]) <= 1.0)
-                            found = reached[j] = 1;
+                            fabs((double)s.position[2][j] - at[2]) <= 1.0) {
+                            found = true;
+                            reached[j] = 1;
+                        }
                     assert_true(found);
                 }
         for (size_t j = 0; j < s.count; j++)
