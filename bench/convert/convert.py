@@ -17,12 +17,16 @@ import sys
 
 from errors import ConvertError
 
-DATA = {"dlf": ("read_dlf", "Liquid3d, WBC-SPH: msgpack + zstd shards (.msgpack.zst)"),
-        "gns": ("read_gns", "Water-Ramps: .tfrecord beside metadata.json"),
-        "lagrangebench": ("read_lagrangebench", "LagrangeBench: .h5 beside metadata.json")}
-WEIGHTS = {"dmcf": "TensorFlow checkpoint of the DMCF Liquid3d network (its .index file)",
-           "cconv-h5": "Keras .h5 of the CConv Liquid3d network",
-           "cconv-pt": "PyTorch .pt of the CConv Liquid3d network"}
+DATA = {
+    "dlf": ("read_dlf", "Liquid3d, WBC-SPH: msgpack + zstd shards (.msgpack.zst)"),
+    "gns": ("read_gns", "Water-Ramps: .tfrecord beside metadata.json"),
+    "lagrangebench": ("read_lagrangebench", "LagrangeBench: .h5 beside metadata.json"),
+}
+WEIGHTS = {
+    "dmcf": "TensorFlow checkpoint of the DMCF Liquid3d network (its .index file)",
+    "cconv-h5": "Keras .h5 of the CConv Liquid3d network",
+    "cconv-pt": "PyTorch .pt of the CConv Liquid3d network",
+}
 
 
 def positive(text):
@@ -50,9 +54,14 @@ def arguments(argv):
     parser = argparse.ArgumentParser(prog="convert.py", description=__doc__.split("\n")[0])
     commands = parser.add_subparsers(dest="command", required=True)
 
-    data = commands.add_parser("data", help="sequences", formatter_class=argparse.RawTextHelpFormatter)
-    data.add_argument("format", choices=DATA, help="\n".join(
-        f"{name}: {about}" for name, (_, about) in DATA.items()))
+    data = commands.add_parser(
+        "data", help="sequences", formatter_class=argparse.RawTextHelpFormatter
+    )
+    data.add_argument(
+        "format",
+        choices=DATA,
+        help="\n".join(f"{name}: {about}" for name, (_, about) in DATA.items()),
+    )
     data.add_argument("input", nargs="+", help="files, or folders of them")
     data.add_argument("-o", "--output", required=True, metavar="DIR")
     data.add_argument("--count", type=count, help="only the first COUNT sequences")
@@ -60,20 +69,37 @@ def arguments(argv):
     data.add_argument("--dt", type=positive, help="time between frames, s")
     data.add_argument("--gravity", type=vector, metavar='"X Y [Z]"', help="m/s^2")
     data.add_argument("--rest-density", type=positive, help="kg/m^3")
-    data.add_argument("--dim", type=int, choices=(2, 3), help="dlf: 2 drops z (as found by default)")
+    data.add_argument(
+        "--dim", type=int, choices=(2, 3), help="dlf: 2 drops z (as found by default)"
+    )
     data.add_argument("--metadata", help="gns, lagrangebench: where metadata.json is")
-    data.add_argument("--fluid-type", type=count, action="append",
-                      help="gns: particle type read as fluid (5, water); may be repeated")
-    data.add_argument("--wall-layers", type=count, default=3,
-                      help="gns: layers of wall particles around the box (3; 0 = none)")
-    data.add_argument("--moving-walls-at-rest", action="store_true",
-                      help="lagrangebench: convert moving walls as if they stood still")
+    data.add_argument(
+        "--fluid-type",
+        type=count,
+        action="append",
+        help="gns: particle type read as fluid (5, water); may be repeated",
+    )
+    data.add_argument(
+        "--wall-layers",
+        type=count,
+        default=3,
+        help="gns: layers of wall particles around the box (3; 0 = none)",
+    )
+    data.add_argument(
+        "--moving-walls-at-rest",
+        action="store_true",
+        help="lagrangebench: convert moving walls as if they stood still",
+    )
     data.add_argument("--source", help="text for the files' metadata")
 
-    weights = commands.add_parser("weights", help="model files",
-                                  formatter_class=argparse.RawTextHelpFormatter)
-    weights.add_argument("format", choices=WEIGHTS, help="\n".join(
-        f"{name}: {about}" for name, about in WEIGHTS.items()))
+    weights = commands.add_parser(
+        "weights", help="model files", formatter_class=argparse.RawTextHelpFormatter
+    )
+    weights.add_argument(
+        "format",
+        choices=WEIGHTS,
+        help="\n".join(f"{name}: {about}" for name, about in WEIGHTS.items()),
+    )
     weights.add_argument("input")
     weights.add_argument("-o", "--output", required=True, metavar="FILE")
     return parser.parse_args(argv)
@@ -101,8 +127,12 @@ def convert_data(options):
     sequences = reader.read(files(options.input, reader.SUFFIX), options)
     for item in itertools.islice(sequences, options.count):
         if item.name in written:
-            raise ConvertError(item.origin, "name", f"{item.name} was already written from another input; "
-                               "convert them into different folders")
+            raise ConvertError(
+                item.origin,
+                "name",
+                f"{item.name} was already written from another input; "
+                "convert them into different folders",
+            )
         sequence.write(item, options.output)
         written.add(item.name)
 
@@ -113,13 +143,17 @@ def main(argv=None):
         if options.command == "data":
             convert_data(options)
         else:
-            importlib.import_module("weights").convert(options.format, options.input, options.output)
+            importlib.import_module("weights").convert(
+                options.format, options.input, options.output
+            )
     except ConvertError as error:
         print(f"convert: error: {error}", file=sys.stderr)
         return 2
     except ModuleNotFoundError as error:
-        print(f"convert: error: Python module {error.name} is missing; see requirements.txt",
-              file=sys.stderr)
+        print(
+            f"convert: error: Python module {error.name} is missing; see requirements.txt",
+            file=sys.stderr,
+        )
         return 2
     except OSError as error:
         print(f"convert: error: {error.filename or ''}: {error.strerror or error}", file=sys.stderr)

@@ -51,9 +51,13 @@ def crc32c(data):
             registers = _TABLE[(registers ^ column) & 0xFF] ^ (registers >> 8)
         a, b, c, d = _lane_tables()
         for lane in registers.tolist():
-            register = lane ^ (a[register & 255] ^ b[register >> 8 & 255]
-                               ^ c[register >> 16 & 255] ^ d[register >> 24])
-    for byte in bytes_[lanes * LANE:].tolist():
+            register = lane ^ (
+                a[register & 255]
+                ^ b[register >> 8 & 255]
+                ^ c[register >> 16 & 255]
+                ^ d[register >> 24]
+            )
+    for byte in bytes_[lanes * LANE :].tolist():
         register = _TABLE_LIST[(register ^ byte) & 0xFF] ^ (register >> 8)
     return register ^ 0xFFFFFFFF
 

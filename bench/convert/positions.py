@@ -71,7 +71,9 @@ def unwrap(position, size, periodic):
 def with_first_velocity(path, position, dt):
     """(position, velocity) of the frames from the second on."""
     if len(position) < 2:
-        raise ConvertError(path, "position", f"{len(position)} frames; two are needed for a velocity")
+        raise ConvertError(
+            path, "position", f"{len(position)} frames; two are needed for a velocity"
+        )
     velocity = (position[1:2].astype(np.float64) - position[0:1]) / dt
     return position[1:], velocity.astype(np.float32)
 
@@ -82,6 +84,9 @@ def still(path, name, position):
         return position[0]
     moved = float(np.ptp(position, axis=0).max())
     if moved > 1e-5 * float(np.abs(position).max()):
-        raise ConvertError(path, name, f"boundary particles move by up to {moved:g} m; a sequence "
-                           "file's boundary is at rest")
+        raise ConvertError(
+            path,
+            name,
+            f"boundary particles move by up to {moved:g} m; a sequence file's boundary is at rest",
+        )
     return position[0]

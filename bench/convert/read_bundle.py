@@ -38,13 +38,13 @@ def snappy(data):
         extra = max(0, length - 60) if kind == 0 else (1, 2, 4)[kind - 1]
         if at + extra > len(data):
             raise wire.WireError("snappy block ends inside a tag")
-        number = int.from_bytes(data[at: at + extra], "little")
+        number = int.from_bytes(data[at : at + extra], "little")
         at += extra
         if kind == 0:
             length = number + 1 if extra else length
             if at + length > len(data):
                 raise wire.WireError("snappy literal longer than its block")
-            out += data[at: at + length]
+            out += data[at : at + length]
             at += length
             continue
         if kind == 1:
@@ -74,9 +74,9 @@ class Table:
         size, _ = wire.varint(handle, at)
         if offset + size + 5 > len(self.data) - 48:
             raise ConvertError(self.path, name, f"{size} bytes at {offset}: outside the file")
-        body, kind = self.data[offset: offset + size], self.data[offset + size]
-        crc = struct.unpack("<I", self.data[offset + size + 1: offset + size + 5])[0]
-        if masked_crc32c(self.data[offset: offset + size + 1]) != crc:
+        body, kind = self.data[offset : offset + size], self.data[offset + size]
+        crc = struct.unpack("<I", self.data[offset + size + 1 : offset + size + 5])[0]
+        if masked_crc32c(self.data[offset : offset + size + 1]) != crc:
             raise ConvertError(self.path, name, "checksum does not match")
         if kind not in (0, 1):
             raise ConvertError(self.path, name, f"compression {kind} is unknown")
@@ -96,8 +96,8 @@ class Table:
             size, at = wire.varint(block, at)
             if shared > len(key) or at + rest + size > end:
                 raise ConvertError(self.path, name, "entry longer than its block")
-            key = key[:shared] + block[at: at + rest]
-            yield key, block[at + rest: at + rest + size]
+            key = key[:shared] + block[at : at + rest]
+            yield key, block[at + rest : at + rest + size]
             at += rest + size
 
     def __iter__(self):
@@ -129,8 +129,7 @@ def entry_of(value):
         if field == 1 and kind == 0:
             e.dtype = item
         elif field == 2 and kind == 2:
-            sizes = [dict((n, v) for n, k, v in wire.fields(dim) if k == 0).get(1, 0)
-                     for dim in wire.messages(item, 2)]
+            sizes = [wire.integers(dim).get(1, 0) for dim in wire.messages(item, 2)]
             e.shape = tuple(wire.signed(size) for size in sizes)
         elif field == 3 and kind == 0:
             e.shard = item
@@ -168,16 +167,20 @@ class Bundle:
 
     def read_header(self, header):
         try:
-            found = {number: value for number, _, value in wire.fields(header)}
-            version = {n: v for n, _, v in wire.fields(found.get(3, b""))}
-        except (wire.WireError, TypeError) as error:
+            found = wire.integers(header)
+            version = wire.integers(b"".join(wire.messages(header, 3)))
+        except wire.WireError as error:
             raise ConvertError(self.index, "header", str(error)) from None
         self.shard_count = found.get(1, 0)
         if found.get(2, 0) != 0:
             raise ConvertError(self.index, "header", "big-endian tensors are not read")
         if version.get(1, 0) != 1 or version.get(2, 0) > 1:
-            raise ConvertError(self.index, "header", f"unknown version: producer {version.get(1, 0)}, "
-                               f"min_consumer {version.get(2, 0)}; version 1 is read")
+            raise ConvertError(
+                self.index,
+                "header",
+                f"unknown version: producer {version.get(1, 0)}, "
+                f"min_consumer {version.get(2, 0)}; version 1 is read",
+            )
 
     def raw(self, name):
         e = self.entries.get(name)
@@ -192,9 +195,10 @@ class Bundle:
             self.shards[e.shard] = (path, read_file(path, MAX_BYTES))
         path, data = self.shards[e.shard]
         if e.offset + e.size > len(data):
-            raise ConvertError(path, name, f"truncated: {e.size} bytes at {e.offset}, the file has "
-                               f"{len(data)}")
-        return path, e, data[e.offset: e.offset + e.size]
+            raise ConvertError(
+                path, name, f"truncated: {e.size} bytes at {e.offset}, the file has {len(data)}"
+            )
+        return path, e, data[e.offset : e.offset + e.size]
 
     def tensor(self, name):
         path, e, data = self.raw(name)
@@ -224,11 +228,13 @@ class Bundle:
         if at + 4 + length != len(data):
             raise ConvertError(path, name, f"string of {length} bytes in {len(data)}")
         fixed = length.to_bytes(4 if length < 1 << 32 else 8, "little")
-        stored = data[at: at + 4]
-        if mask(crc32c(fixed)) != struct.unpack("<I", stored)[0] or \
-                mask(crc32c(fixed + stored + data[at + 4:])) != e.crc:
+        stored = data[at : at + 4]
+        if (
+            mask(crc32c(fixed)) != struct.unpack("<I", stored)[0]
+            or mask(crc32c(fixed + stored + data[at + 4 :])) != e.crc
+        ):
             raise ConvertError(path, name, "checksum does not match")
-        return data[at + 4:]
+        return data[at + 4 :]
 
     def read_graph(self):
         """[(children {name: node}, keys {variable: key})] of the saved objects."""
@@ -237,13 +243,12 @@ class Bundle:
             for node in wire.messages(self.text(GRAPH_KEY), 1):
                 children, keys = {}, {}
                 for child in wire.messages(node, 1):
-                    found = {n: v for n, _, v in wire.fields(child)}
-                    children[bytes(found.get(2, b"")).decode()] = found.get(1, 0)
+                    children[wire.texts(child).get(2, "")] = wire.integers(child).get(1, 0)
                 for attribute in wire.messages(node, 2):
-                    found = {n: v for n, _, v in wire.fields(attribute)}
-                    keys[bytes(found.get(1, b"")).decode()] = bytes(found.get(3, b"")).decode()
+                    found = wire.texts(attribute)
+                    keys[found.get(1, "")] = found.get(3, "")
                 nodes.append((children, keys))
-        except (wire.WireError, UnicodeDecodeError, TypeError) as error:
+        except wire.WireError as error:
             raise ConvertError(self.index, GRAPH_KEY, str(error)) from None
         return nodes
 

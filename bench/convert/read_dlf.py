@@ -25,21 +25,24 @@ NEEDED = ("scene_id", "frame_id", "pos", "vel")
 def decompress(path):
     """The bytes of the one zstd frame of a file; a frame cut short is an error, not less data."""
     import zstandard
+
     data = read_file(path)
     stream = zstandard.ZstdDecompressor().decompressobj()
     pieces, total = [], 0
     try:
         for begin in range(0, len(data), CHUNK):
-            if stream.eof:
-                break
-            pieces.append(stream.decompress(data[begin: begin + CHUNK]))
+            pieces.append(stream.decompress(data[begin : begin + CHUNK]))
             total += len(pieces[-1])
             if total > MAX_BYTES:
                 raise ConvertError(path, "zstd", f"more than {MAX_BYTES} bytes when unpacked")
     except zstandard.ZstdError as error:
         raise ConvertError(path, "zstd", str(error)) from None
     if not stream.eof:
-        raise ConvertError(path, "zstd", f"truncated: the frame does not end within {len(data)} bytes")
+        raise ConvertError(
+            path, "zstd", f"truncated: the frame does not end within {len(data)} bytes"
+        )
+    if stream.unused_data:
+        raise ConvertError(path, "zstd", "bytes after the end of the frame")
     return b"".join(pieces)
 
 
@@ -77,9 +80,10 @@ def decode(path, field, value):
 def records(path):
     """The frames of one shard."""
     import msgpack
+
     try:
         value = msgpack.unpackb(decompress(path), raw=False, strict_map_key=False)
-    except (msgpack.exceptions.UnpackException, ValueError) as error:
+    except (msgpack.exceptions.UnpackException, ValueError, TypeError) as error:
         raise ConvertError(path, "msgpack", str(error) or type(error).__name__) from None
     if not isinstance(value, list) or not value:
         raise ConvertError(path, "msgpack", "expected a list of frames")
@@ -93,9 +97,19 @@ def records(path):
                 raise ConvertError(path, f"[{i}].{key}", "missing")
         rigid = frame.get("num_rigid_bodies")
         if rigid is not None and decode(path, f"[{i}].num_rigid_bodies", rigid).max(initial=0) != 0:
-            raise ConvertError(path, f"[{i}].num_rigid_bodies",
-                               "moving rigid bodies; a sequence file has no place for them")
+            raise ConvertError(
+                path,
+                f"[{i}].num_rigid_bodies",
+                "moving rigid bodies; a sequence file has no place for them",
+            )
     return value
+
+
+def rows(where, field, array):
+    """An array of vectors as [n][3]; leading axes are joined."""
+    if array.ndim == 0 or array.shape[-1] != 3:
+        raise ConvertError(where, field, f"shape {list(array.shape)}, expected [any, 3]")
+    return array.reshape(-1, 3)
 
 
 class Scene:
@@ -109,8 +123,9 @@ class Scene:
     def add(self, path, i, frame):
         def get(key):
             return decode(path, f"[{i}].{key}", frame[key])
+
         number = get("frame_id")
-        if number.shape != () or number != np.floor(number):
+        if number.shape != () or not np.isfinite(number) or number != np.floor(number):
             raise ConvertError(path, f"[{i}].frame_id", "expected a whole number")
         arrays = {key: get(key) for key in ("pos", "vel", "m", "grav") if key in frame}
         where = f"{path}[{i}]"
@@ -118,14 +133,22 @@ class Scene:
         sequence.check_shape(where, "vel", arrays["vel"], (len(arrays["pos"]), 3))
         for key, array in arrays.items():
             sequence.check_finite(where, key, array)
+        if "grav" in arrays:
+            arrays["grav"] = rows(where, "grav", arrays["grav"])
+        if len(arrays["pos"]) == 0:
+            raise ConvertError(path, f"[{i}].pos", "no fluid particles")
         if self.frames and len(arrays["pos"]) != len(self.frames[0][2]["pos"]):
-            raise ConvertError(path, f"[{i}].pos", f"{len(arrays['pos'])} particles; the scene began "
-                               f"with {len(self.frames[0][2]['pos'])}, and a sequence keeps its count")
+            raise ConvertError(
+                path,
+                f"[{i}].pos",
+                f"{len(arrays['pos'])} particles; the scene began "
+                f"with {len(self.frames[0][2]['pos'])}, and a sequence keeps its count",
+            )
         self.frames.append((int(number), path, arrays))
         if ("box" in frame) != ("box_normals" in frame):
             raise ConvertError(path, f"[{i}].box", "box and box_normals come only together")
         if "box" in frame:
-            box = get("box").reshape(-1, 3), get("box_normals").reshape(-1, 3)
+            box = tuple(rows(where, key, get(key)) for key in ("box", "box_normals"))
             sequence.check_shape(where, "box_normals", box[1], (len(box[0]), 3))
             if self.box is None:
                 self.box = box
@@ -140,8 +163,12 @@ class Scene:
         if len(steps) > 1 or 0 in steps:
             step = min(steps - {0}, default=1)
             at = next(i for i, (a, b) in enumerate(zip(ids, ids[1:])) if b - a != step)
-            raise ConvertError(self.frames[at + 1][1], "frame_id", f"{ids[at + 1]} follows {ids[at]} in "
-                               f"scene {self.name}: a shard is missing or given twice")
+            raise ConvertError(
+                self.frames[at + 1][1],
+                "frame_id",
+                f"{ids[at + 1]} follows {ids[at]} in "
+                f"scene {self.name}: a shard is missing or given twice",
+            )
         return self.frames
 
 
@@ -158,7 +185,7 @@ def frame_time(position, velocity):
         return float("nan")
     last = min(len(position), 32)
     moved = np.diff(position[:last].astype(np.float64), axis=0)
-    mean = (velocity[1:last].astype(np.float64) + velocity[:last - 1]) / 2
+    mean = (velocity[1:last].astype(np.float64) + velocity[: last - 1]) / 2
     square = (mean * mean).sum()
     return float((moved * mean).sum() / square) if square > 1e-12 * mean.size else float("nan")
 
@@ -166,12 +193,12 @@ def frame_time(position, velocity):
 def gravity_of(scene, frames, dim, given):
     if given is not None:
         return given
-    stored = [arrays["grav"].reshape(-1, 3) for _, _, arrays in frames if "grav" in arrays]
+    stored = [arrays["grav"] for _, _, arrays in frames if "grav" in arrays]
     if not stored:
         return (0.0, -9.81, 0.0)[:dim]
     if len(stored) != len(frames):
         raise ConvertError(scene.path, "grav", "only some frames have it")
-    if any(not np.array_equal(row, stored[0][0]) for array in stored for row in array):
+    if not all(len(array) and (array == stored[0][0]).all() for array in stored):
         raise ConvertError(scene.path, "grav", "changes within the scene")
     return tuple(stored[0][0][:dim])
 
@@ -188,10 +215,18 @@ def to_sequence(scene, options):
     dt = options.dt or (0.02 if dim == 3 else 0.0025)
     seen = frame_time(position, velocity)
     if np.isfinite(seen) and not 0.8 < seen / dt < 1.25:
-        warn(scene.path, "dt", f"{dt:g} s, but positions and velocities suggest {seen:.3g} s; see --dt")
+        warn(
+            scene.path,
+            "dt",
+            f"{dt:g} s, but positions and velocities suggest {seen:.3g} s; see --dt",
+        )
     spacing, spacing_from = sequence.choose_spacing(
-        scene.path, position[0], options.spacing,
-        LIQUID3D_SPACING if dim == 3 else None, "the published generator")
+        scene.path,
+        position[0],
+        options.spacing,
+        LIQUID3D_SPACING if dim == 3 else None,
+        "the published generator",
+    )
 
     extra = {"scene": scene.name, "frame_ids": f"{frames[0][0]} to {frames[-1][0]}"}
     zero = np.linalg.norm(normal, axis=1) < 1e-6
@@ -209,13 +244,24 @@ def to_sequence(scene, options):
         if options.rest_density is None:
             density = float(f"{mass / spacing ** dim:.6g}")
     if mass is None:
-        mass = density * spacing ** dim
+        mass = sequence.lattice_mass(density, spacing, dim)
     return sequence.Sequence(
-        origin=scene.path, name=scene.name, position=position, velocity=velocity,
-        boundary=boundary, normal=normal, dt=dt, gravity=gravity_of(scene, frames, dim, options.gravity),
-        spacing=spacing, spacing_from=spacing_from, rest_density=density, particle_mass=mass,
-        source=options.source or f"msgpack shards of DeepLagrangianFluids or DMCF, scene {scene.name}",
-        extra=extra)
+        origin=scene.path,
+        name=scene.name,
+        position=position,
+        velocity=velocity,
+        boundary=boundary,
+        normal=normal,
+        dt=dt,
+        gravity=gravity_of(scene, frames, dim, options.gravity),
+        spacing=spacing,
+        spacing_from=spacing_from,
+        rest_density=density,
+        particle_mass=mass,
+        source=options.source
+        or f"msgpack shards of DeepLagrangianFluids or DMCF, scene {scene.name}",
+        extra=extra,
+    )
 
 
 def shard_order(path):
@@ -235,8 +281,12 @@ def read(paths, options):
                     yield to_sequence(scene, options)
                     done.add(scene.name)
                 if name in done:
-                    raise ConvertError(path, f"[{i}].scene_id", f"{name} was already complete; convert "
-                                       "folders with the same scene names one by one")
+                    raise ConvertError(
+                        path,
+                        f"[{i}].scene_id",
+                        f"{name} was already complete; convert "
+                        "folders with the same scene names one by one",
+                    )
                 scene = Scene(path, name)
             scene.add(path, i, frame)
     if scene is not None:

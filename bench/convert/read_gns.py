@@ -45,8 +45,11 @@ def tfrecords(path):
                 raise ConvertError(path, name, "truncated: the file ends inside its length")
             length, crc = struct.unpack("<QI", head)
             if masked_crc32c(head[:8]) != crc:
-                raise ConvertError(path, name, "checksum of the length does not match: no TFRecord "
-                                   "file, or a damaged one")
+                raise ConvertError(
+                    path,
+                    name,
+                    "checksum of the length does not match: no TFRecord file, or a damaged one",
+                )
             if length + 16 > left:
                 raise ConvertError(path, name, f"truncated: {length} bytes, {left - 12} are left")
             data = file.read(length)
@@ -85,8 +88,11 @@ def parse(data):
         lists.update(entries(part))
     kind = feature_bytes(context["particle_type"]) if "particle_type" in context else None
     if "position" in lists:
-        frames = [value for feature in wire.messages(lists["position"], 1)
-                  for value in feature_bytes(feature)]
+        frames = [
+            value
+            for feature in wire.messages(lists["position"], 1)
+            for value in feature_bytes(feature)
+        ]
     else:
         frames = feature_bytes(context["position"]) if "position" in context else None
     return kind, frames
@@ -98,24 +104,31 @@ def decode(where, data, frame_count, dim):
         kind, frames = parse(data)
     except wire.WireError as error:
         raise ConvertError(where, "SequenceExample", str(error)) from None
+    kind = b"".join(kind or [])
     if not kind:
         raise ConvertError(where, "particle_type", "missing")
     if not frames:
         raise ConvertError(where, "position", "missing")
-    kind = b"".join(kind)
     if len(kind) % 8:
         raise ConvertError(where, "particle_type", f"{len(kind)} bytes are no int64s")
     kind = np.frombuffer(kind, "<i8")
     if len(frames) == 1 and frame_count > 1:  # all frames in one value
         size = len(frames[0]) // frame_count
-        frames = [frames[0][i * size: (i + 1) * size] for i in range(frame_count)]
+        frames = [frames[0][i * size : (i + 1) * size] for i in range(frame_count)]
     if len(frames) != frame_count:
-        raise ConvertError(where, "position", f"{len(frames)} frames, metadata.json says {frame_count} "
-                           "(sequence_length + 1)")
+        raise ConvertError(
+            where,
+            "position",
+            f"{len(frames)} frames, metadata.json says {frame_count} (sequence_length + 1)",
+        )
     for i, frame in enumerate(frames):
         if len(frame) != 4 * dim * len(kind):
-            raise ConvertError(where, f"position[{i}]", f"{len(frame)} bytes, expected "
-                               f"{4 * dim * len(kind)}: {len(kind)} particles of {dim} float32s")
+            raise ConvertError(
+                where,
+                f"position[{i}]",
+                f"{len(frame)} bytes, expected "
+                f"{4 * dim * len(kind)}: {len(kind)} particles of {dim} float32s",
+            )
     position = np.frombuffer(b"".join(frames), "<f4").reshape(frame_count, len(kind), dim)
     sequence.check_finite(where, "position", position)
     return kind, position
@@ -129,8 +142,12 @@ def read_one(path, options):
     if frame_count < 2:
         raise ConvertError(meta_path, "sequence_length", f"{frame_count - 1}")
     if "context_mean" in metadata:
-        raise ConvertError(meta_path, "context_mean", "the set has step_context, an outer influence "
-                           "that changes over time; a sequence file has no place for it")
+        raise ConvertError(
+            meta_path,
+            "context_mean",
+            "the set has step_context, an outer influence "
+            "that changes over time; a sequence file has no place for it",
+        )
     low, high = positions.bounds(meta_path, metadata, dim)
     dt = options.dt or positions.get(meta_path, metadata, "dt", float)
     stem = os.path.basename(path).removesuffix(SUFFIX)
@@ -141,28 +158,48 @@ def read_one(path, options):
         other = sorted(set(kind.tolist()) - {BOUNDARY, *fluid_types})
         if other:
             names = ", ".join(f"{k} ({NAMES.get(k, 'unknown')})" for k in other)
-            raise ConvertError(where, "particle_type", f"{names}; only {BOUNDARY} (boundary) and fluid "
-                               f"({', '.join(map(str, fluid_types))}) are read; see --fluid-type")
+            raise ConvertError(
+                where,
+                "particle_type",
+                f"{names}; only {BOUNDARY} (boundary) and fluid "
+                f"({', '.join(map(str, fluid_types))}) are read; see --fluid-type",
+            )
         is_fluid = np.isin(kind, fluid_types)
         if not is_fluid.any():
             raise ConvertError(where, "particle_type", "no fluid particles")
         ramps = positions.still(where, "position", position[:, ~is_fluid])
         fluid, velocity = positions.with_first_velocity(where, position[:, is_fluid], dt)
-        spacing, spacing_from = sequence.choose_spacing(where, position[0, is_fluid], options.spacing)
-        walls, wall_normals = sequence.walls_around(low, high, [False] * dim, spacing,
-                                                    options.wall_layers)
+        spacing, spacing_from = sequence.choose_spacing(
+            where, position[0, is_fluid], options.spacing
+        )
+        walls, wall_normals = sequence.walls_around(
+            low, high, [False] * dim, spacing, options.wall_layers
+        )
         ramp_normals = sequence.estimated_normals(ramps, fluid[0], spacing)
         density = options.rest_density or 1000.0
         yield sequence.Sequence(
-            origin=where, name=f"{stem}_{index:05d}", position=fluid, velocity=velocity,
+            origin=where,
+            name=f"{stem}_{index:05d}",
+            position=fluid,
+            velocity=velocity,
             boundary=np.concatenate([ramps, walls]).astype(np.float32),
-            normal=np.concatenate([ramp_normals, wall_normals]).astype(np.float32), dt=dt,
-            gravity=options.gravity or (0.0, -9.81, 0.0)[:dim], spacing=spacing,
-            spacing_from=spacing_from, rest_density=density, particle_mass=density * spacing ** dim,
+            normal=np.concatenate([ramp_normals, wall_normals]).astype(np.float32),
+            dt=dt,
+            gravity=options.gravity or (0.0, -9.81, 0.0)[:dim],
+            spacing=spacing,
+            spacing_from=spacing_from,
+            rest_density=density,
+            particle_mass=sequence.lattice_mass(density, spacing, dim),
             source=options.source or f"learning_to_simulate TFRecord, {stem}, record {index}",
-            extra={"box_min": sequence.numbers(low), "box_max": sequence.numbers(high),
-                   "boundary_order": f"{len(ramps)} of the data (normals estimated), then "
-                                     f"{len(walls)} sampled around the box"})
+            extra={
+                "box_min": sequence.numbers(low),
+                "box_max": sequence.numbers(high),
+                "boundary_order": (
+                    f"{len(ramps)} of the data (normals estimated), then "
+                    f"{len(walls)} sampled around the box"
+                ),
+            },
+        )
 
 
 def read(paths, options):

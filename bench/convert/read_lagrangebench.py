@@ -14,6 +14,7 @@ import os
 
 import numpy as np
 
+import hdf5
 import positions
 import sequence
 from errors import ConvertError
@@ -22,22 +23,12 @@ SUFFIX = ".h5"
 PADDING, FLUID, WALL, MOVING_WALL, RIGID = -1, 0, 1, 2, 3
 
 
-def dataset(where, group, name):
-    import h5py
-    if not isinstance(group, h5py.Group) or not isinstance(group.get(name), h5py.Dataset):
-        raise ConvertError(where, name, "missing")
-    if group[name].dtype.kind not in "fiu":
-        raise ConvertError(where, name, f"type {group[name].dtype}, expected numbers")
-    try:
-        return group[name][()]
-    except OSError as error:
-        raise ConvertError(where, name, f"cannot be read: {error}") from None
-
-
 def periodic_axes(path, metadata, dim):
     value = metadata.get("periodic_boundary_conditions", [False] * dim)
     if not isinstance(value, list) or len(value) < dim or any(type(v) is not bool for v in value):
-        raise ConvertError(path, "periodic_boundary_conditions", f"{value!r}, expected {dim} booleans")
+        raise ConvertError(
+            path, "periodic_boundary_conditions", f"{value!r}, expected {dim} booleans"
+        )
     return value[:dim]
 
 
@@ -51,19 +42,30 @@ def gravity_of(path, metadata, dim, given):
         return (0.0,) * dim
     if case.upper() in ("DB", "DAM"):
         return (0.0, -magnitude, 0.0)[:dim]
-    raise ConvertError(path, "g_ext_magnitude", f"{magnitude:g} in case {case!r}: the direction is not "
-                       "in the data (it may vary in space); give --gravity")
+    raise ConvertError(
+        path,
+        "g_ext_magnitude",
+        f"{magnitude:g} in case {case!r}: the direction is not "
+        "in the data (it may vary in space); give --gravity",
+    )
 
 
 def split_types(where, kind, position, moving_is_static):
     """(fluid [T][N][dim], boundary [M][dim])."""
     unknown = sorted(set(kind.tolist()) - {PADDING, FLUID, WALL, MOVING_WALL})
     if unknown:
-        raise ConvertError(where, "particle_type", f"{unknown}: rigid bodies and unknown types have no "
-                           "place in a sequence file")
+        raise ConvertError(
+            where,
+            "particle_type",
+            f"{unknown}: rigid bodies and unknown types have no place in a sequence file",
+        )
     if (kind == MOVING_WALL).any() and not moving_is_static:
-        raise ConvertError(where, "particle_type", f"{int((kind == MOVING_WALL).sum())} particles of a "
-                           "moving wall; --moving-walls-at-rest converts them as a wall at rest")
+        raise ConvertError(
+            where,
+            "particle_type",
+            f"{int((kind == MOVING_WALL).sum())} particles of a "
+            "moving wall; --moving-walls-at-rest converts them as a wall at rest",
+        )
     fluid = position[:, kind == FLUID]
     if fluid.shape[1] == 0:
         raise ConvertError(where, "particle_type", "no fluid particles")
@@ -74,7 +76,8 @@ def split_types(where, kind, position, moving_is_static):
 
 def trajectory(where, stem, key, group, meta_path, metadata, options):
     dim = positions.dimension(meta_path, metadata, options.dim)
-    position, kind = dataset(where, group, "position"), dataset(where, group, "particle_type")
+    position = hdf5.numbers(where, group, "position")
+    kind = hdf5.numbers(where, group, "particle_type")
     sequence.check_shape(where, "position", position, (None, None, dim))
     sequence.check_shape(where, "particle_type", kind, (position.shape[1],))
     sequence.check_finite(where, "position", position)
@@ -86,37 +89,50 @@ def trajectory(where, stem, key, group, meta_path, metadata, options):
 
     fluid, boundary = split_types(where, kind, position, options.moving_walls_at_rest)
     spacing, spacing_from = sequence.choose_spacing(
-        where, fluid[0], options.spacing, positions.get(meta_path, metadata, "dx", float),
-        "dx of metadata.json")
+        where,
+        fluid[0],
+        options.spacing,
+        positions.get(meta_path, metadata, "dx", float),
+        "dx of metadata.json",
+    )
     fluid, velocity = positions.with_first_velocity(
-        where, positions.unwrap(fluid, high - low, periodic), dt)
+        where, positions.unwrap(fluid, high - low, periodic), dt
+    )
     normal = sequence.estimated_normals(boundary, fluid[0], spacing)
     density = options.rest_density or 1.0  # these sets are without dimensions
-    extra = {"periodic": " ".join("1" if p else "0" for p in periodic),
-             "box_min": sequence.numbers(low), "box_max": sequence.numbers(high),
-             "particle_types": f"{fluid.shape[1]} fluid, {len(boundary)} boundary (normals estimated)"}
+    extra = {
+        "periodic": " ".join("1" if p else "0" for p in periodic),
+        "box_min": sequence.numbers(low),
+        "box_max": sequence.numbers(high),
+        "particle_types": f"{fluid.shape[1]} fluid, {len(boundary)} boundary (normals estimated)",
+    }
     return sequence.Sequence(
-        origin=where, name=f"{stem}_{key}", position=fluid, velocity=velocity,
-        boundary=boundary, normal=normal.astype(np.float32), dt=dt,
-        gravity=gravity_of(meta_path, metadata, dim, options.gravity), spacing=spacing,
-        spacing_from=spacing_from, rest_density=density, particle_mass=density * spacing ** dim,
-        source=options.source or f"LagrangeBench {metadata.get('case', '')} {stem}, trajectory {key}"
-        .replace("  ", " "), extra=extra)
+        origin=where,
+        name=f"{stem}_{key}",
+        position=fluid,
+        velocity=velocity,
+        boundary=boundary,
+        normal=normal.astype(np.float32),
+        dt=dt,
+        gravity=gravity_of(meta_path, metadata, dim, options.gravity),
+        spacing=spacing,
+        spacing_from=spacing_from,
+        rest_density=density,
+        particle_mass=sequence.lattice_mass(density, spacing, dim),
+        source=options.source
+        or f"LagrangeBench {metadata.get('case', '')} {stem}, trajectory {key}".replace("  ", " "),
+        extra=extra,
+    )
 
 
 def read(paths, options):
-    import h5py
     for path in sorted(paths):
         meta_path, metadata = positions.read_metadata(path, options.metadata)
-        if not os.path.isfile(path):
-            raise ConvertError(path, "", "no such file")
-        try:
-            file = h5py.File(path, "r")
-        except OSError as error:
-            raise ConvertError(path, "HDF5", f"not readable, or truncated: {error}") from None
-        with file:
-            if not len(file):
-                raise ConvertError(path, "", "no trajectories")
-            stem = os.path.basename(path).removesuffix(SUFFIX)
-            for key in sorted(file):
-                yield trajectory(f"{path}: {key}", stem, key, file[key], meta_path, metadata, options)
+        stem = os.path.basename(path).removesuffix(SUFFIX)
+        with hdf5.opened(path) as file:
+            with hdf5.reading(path, "/"):
+                groups = {key: file[key] for key in sorted(file)}
+            if not groups:
+                raise ConvertError(path, "/", "no trajectories")
+            for key, group in groups.items():
+                yield trajectory(f"{path}: {key}", stem, key, group, meta_path, metadata, options)

@@ -20,18 +20,18 @@ VERSION = "1"
 
 @dataclass
 class Sequence:
-    origin: str             # file it comes from, for messages
-    name: str               # of the file to write, without extension
-    position: np.ndarray    # [T][N][dim], m
-    velocity: np.ndarray    # [T][N][dim] or [1][N][dim], m/s
-    boundary: np.ndarray    # [M][dim], m
-    normal: np.ndarray      # [M][dim], unit, into the fluid
-    dt: float               # s between frames
-    gravity: tuple          # m/s^2
-    spacing: float          # m
-    spacing_from: str       # where the spacing was taken from
-    rest_density: float     # kg/m^3
-    particle_mass: float    # kg; per metre of depth in 2D
+    origin: str  # file it comes from, for messages
+    name: str  # of the file to write, without extension
+    position: np.ndarray  # [T][N][dim], m
+    velocity: np.ndarray  # [T][N][dim] or [1][N][dim], m/s
+    boundary: np.ndarray  # [M][dim], m
+    normal: np.ndarray  # [M][dim], unit, into the fluid
+    dt: float  # s between frames
+    gravity: tuple  # m/s^2
+    spacing: float  # m
+    spacing_from: str  # where the spacing was taken from
+    rest_density: float  # kg/m^3
+    particle_mass: float  # kg; per metre of depth in 2D
     source: str
     extra: dict = field(default_factory=dict)  # further metadata, text to text
 
@@ -56,7 +56,9 @@ def check_finite(origin, name, array):
 
 def check_shape(origin, name, array, shape):
     """shape: a tuple of sizes, None where any will do."""
-    if len(array.shape) != len(shape) or any(w not in (None, s) for s, w in zip(array.shape, shape)):
+    if len(array.shape) != len(shape) or any(
+        w not in (None, s) for s, w in zip(array.shape, shape)
+    ):
         wanted = ", ".join("any" if size is None else str(size) for size in shape)
         raise ConvertError(origin, name, f"shape {list(array.shape)}, expected [{wanted}]")
 
@@ -74,7 +76,9 @@ def check(s):
         raise ConvertError(s.origin, "position", f"{dim} dimensions, expected 2 or 3")
     if frames == 0 or count == 0:
         raise ConvertError(s.origin, "position", f"{frames} frames of {count} fluid particles")
-    check_shape(s.origin, "velocity", s.velocity, (frames if len(s.velocity) != 1 else 1, count, dim))
+    check_shape(
+        s.origin, "velocity", s.velocity, (frames if len(s.velocity) != 1 else 1, count, dim)
+    )
     check_shape(s.origin, "boundary position", s.boundary, (None, dim))
     check_shape(s.origin, "boundary normal", s.normal, (len(s.boundary), dim))
     for name in ("position", "velocity", "boundary", "normal"):
@@ -93,10 +97,16 @@ def check(s):
 def metadata(s):
     dim = s.position.shape[2]
     return {
-        "format": "ascc.sequence", "version": VERSION, "dim": str(dim), "dt": number(s.dt),
-        "gravity": numbers(s.gravity), "particle_radius": number(s.spacing / 2),
-        "particle_mass": number(s.particle_mass), "rest_density": number(s.rest_density),
-        "source": s.source, "spacing_from": s.spacing_from,
+        "format": "ascc.sequence",
+        "version": VERSION,
+        "dim": str(dim),
+        "dt": number(s.dt),
+        "gravity": numbers(s.gravity),
+        "particle_radius": number(s.spacing / 2),
+        "particle_mass": number(s.particle_mass),
+        "rest_density": number(s.rest_density),
+        "source": s.source,
+        "spacing_from": s.spacing_from,
         "velocity_frames": "all" if len(s.velocity) == len(s.position) else "first",
         **s.extra,
     }
@@ -108,13 +118,24 @@ def write(s, folder):
     if not re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9._-]{0,127}", s.name):
         raise ConvertError(s.origin, "name", f"{s.name!r} cannot be the name of a file")
     path = os.path.join(folder, s.name + ".safetensors")
-    tensors = {"fluid.position": s.position, "fluid.velocity": s.velocity,
-               "boundary.position": s.boundary, "boundary.normal": s.normal}
+    tensors = {
+        "fluid.position": s.position,
+        "fluid.velocity": s.velocity,
+        "boundary.position": s.boundary,
+        "boundary.normal": s.normal,
+    }
     tensorfile.write(path, tensors, metadata(s))
     frames, count, dim = s.position.shape
-    print(f"{path}: {dim}D, {frames} frames of {number(s.dt)} s, {count} fluid and "
-          f"{len(s.boundary)} boundary particles, spacing {number(s.spacing)} m ({s.spacing_from})")
+    print(
+        f"{path}: {dim}D, {frames} frames of {number(s.dt)} s, {count} fluid and "
+        f"{len(s.boundary)} boundary particles, spacing {number(s.spacing)} m ({s.spacing_from})"
+    )
     return path
+
+
+def lattice_mass(density, spacing, dim):
+    """Mass of a particle that stands for one cell of the lattice, to nine figures."""
+    return float(f"{density * spacing ** dim:.9g}")
 
 
 def nearest_distance(points, chunk=256):
@@ -122,10 +143,10 @@ def nearest_distance(points, chunk=256):
     points = points.astype(np.float64)
     nearest = np.empty(len(points))
     for begin in range(0, len(points), chunk):
-        rows = points[begin: begin + chunk]
+        rows = points[begin : begin + chunk]
         square = ((rows[:, None] - points[None]) ** 2).sum(-1)
         square[np.arange(len(rows)), begin + np.arange(len(rows))] = np.inf
-        nearest[begin: begin + chunk] = square.min(1)
+        nearest[begin : begin + chunk] = square.min(1)
     return np.sqrt(nearest)
 
 
@@ -135,7 +156,7 @@ def measured_spacing(points, sample=4096):
     Large frames are measured in a slab across the first axis, which keeps neighbours together."""
     if len(points) > sample:
         order = np.argsort(points[:, 0], kind="stable")
-        points = points[order[(len(points) - sample) // 2:][:sample]]
+        points = points[order[(len(points) - sample) // 2 :][:sample]]
     if len(points) < 2:
         return float("nan")
     return float(f"{np.median(nearest_distance(points)):.3g}")
@@ -148,11 +169,17 @@ def choose_spacing(origin, first_frame, given, stated=None, stated_from=""):
         return given, "given"
     if stated is not None:
         if np.isfinite(measured) and not 0.5 < measured / stated < 1.5:
-            warn(origin, "spacing", f"{stated_from} says {stated:g} m, but the median distance to "
-                 f"the nearest particle in the first frame is {measured:g} m; see --spacing")
+            warn(
+                origin,
+                "spacing",
+                f"{stated_from} says {stated:g} m, but the median distance to "
+                f"the nearest particle in the first frame is {measured:g} m; see --spacing",
+            )
         return stated, stated_from
     if not (np.isfinite(measured) and measured > 0):
-        raise ConvertError(origin, "spacing", "cannot be measured in the first frame; give --spacing")
+        raise ConvertError(
+            origin, "spacing", "cannot be measured in the first frame; give --spacing"
+        )
     return measured, "measured in the first frame"
 
 
@@ -190,9 +217,9 @@ def estimated_normals(points, fluid, spacing):
     for i, point in enumerate(points):
         away = fluid[((fluid - point) ** 2).sum(1).argmin()] - point
         offset = points - point
-        square = (offset ** 2).sum(1)
+        square = (offset**2).sum(1)
         near = (square < (3 * width) ** 2) & (square > 0)
-        weight = np.exp(-square[near] / width ** 2)
+        weight = np.exp(-square[near] / width**2)
         offset = offset[near]
         direction = away
         if len(offset):

@@ -18,8 +18,11 @@ def encode(tensors, metadata):
     header, offset, pieces = {"__metadata__": metadata}, 0, []
     for name, tensor in tensors.items():
         piece = np.ascontiguousarray(tensor, "<f4")
-        header[name] = {"dtype": "F32", "shape": list(piece.shape),
-                        "data_offsets": [offset, offset + piece.nbytes]}
+        header[name] = {
+            "dtype": "F32",
+            "shape": list(piece.shape),
+            "data_offsets": [offset, offset + piece.nbytes],
+        }
         offset += piece.nbytes
         pieces.append(piece)
     text = json.dumps(header, separators=(",", ":"), ensure_ascii=False).encode()
@@ -54,15 +57,19 @@ def read(path):
     if len(data) < 8 or size > len(data) - 8:
         raise ConvertError(path, "header", "the file ends inside it")
     try:
-        header = json.loads(data[8: 8 + size])
+        header = json.loads(data[8 : 8 + size])
     except ValueError as error:
         raise ConvertError(path, "header", f"not JSON: {error}") from None
     metadata, tensors = header.pop("__metadata__", {}), {}
-    body = memoryview(data)[8 + size:]
+    body = memoryview(data)[8 + size :]
     for name, entry in header.items():
         begin, end = entry["data_offsets"]
         count = int(np.prod(entry["shape"], dtype=np.int64))
-        if entry["dtype"] != "F32" or not 0 <= begin <= end <= len(body) or end - begin != 4 * count:
+        if (
+            entry["dtype"] != "F32"
+            or not 0 <= begin <= end <= len(body)
+            or end - begin != 4 * count
+        ):
             raise ConvertError(path, name, "dtype, shape and offsets do not fit the file")
         tensors[name] = np.frombuffer(body[begin:end], "<f4").reshape(entry["shape"])
     return tensors, metadata

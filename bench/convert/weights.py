@@ -35,8 +35,13 @@ def network(name):
 def dmcf_object(name):
     """The path of Python attributes in DMCF's checkpoint that leads to a tensor."""
     layer, kind = name.rsplit(".", 1)
-    first = {"conv_fluid": "fluid_convs", "conv_obstacle": "obs_convs", "dense_fluid": "fluid_dense",
-             "dense_obstacle": "obs_dense", "sym0": "sym_convs/0"}
+    first = {
+        "conv_fluid": "fluid_convs",
+        "conv_obstacle": "obs_convs",
+        "dense_fluid": "fluid_dense",
+        "dense_obstacle": "obs_dense",
+        "sym0": "sym_convs/0",
+    }
     if layer in first:
         return f"model/{first[layer]}/{kind.removesuffix('_half')}"
     found = re.fullmatch(r"l(\d+)\.conv_(\d+)_(\d+)", layer)
@@ -51,8 +56,12 @@ def read_dmcf(path, names):
     bundle = read_bundle.Bundle(path)
     layers = len(bundle.node("model/convs")[0])
     if layers != 3:
-        raise ConvertError(bundle.index, "model/convs", f"{layers} trunk layers, the Liquid3d network "
-                           "has 3; DMCF's 2D networks are not converted")
+        raise ConvertError(
+            bundle.index,
+            "model/convs",
+            f"{layers} trunk layers, the Liquid3d network "
+            "has 3; DMCF's 2D networks are not converted",
+        )
     return {name: bundle.variable(dmcf_object(name)) for name in names}
 
 
@@ -78,8 +87,9 @@ def read_cconv_torch(path, names):
         tensors[name] = state[key].T if key != name else state[key]
         used.append(key)
     check_buffers(path, state)
-    refuse_others(path, [key for key in state if key != "gravity" and not key.endswith(".offset")],
-                  used)
+    refuse_others(
+        path, [key for key in state if key != "gravity" and not key.endswith(".offset")], used
+    )
     return tensors
 
 
@@ -99,9 +109,11 @@ def refuse_others(path, found, known):
         raise ConvertError(path, other[0], f"not part of the network ({len(other)} such tensors)")
 
 
-READERS = {"dmcf": ("dmcf-liquid3d", read_dmcf),
-           "cconv-h5": ("cconv-liquid3d", read_cconv_keras),
-           "cconv-pt": ("cconv-liquid3d", read_cconv_torch)}
+READERS = {
+    "dmcf": ("dmcf-liquid3d", read_dmcf),
+    "cconv-h5": ("cconv-liquid3d", read_cconv_keras),
+    "cconv-pt": ("cconv-liquid3d", read_cconv_torch),
+}
 
 
 def check_tensor(path, name, tensor, shape):
@@ -113,8 +125,9 @@ def check_tensor(path, name, tensor, shape):
 
 
 def metadata(path, description, tensors):
-    digest = hashlib.sha256(b"".join(np.ascontiguousarray(tensor, "<f4").tobytes()
-                                     for tensor in tensors.values())).hexdigest()
+    digest = hashlib.sha256(
+        b"".join(np.ascontiguousarray(tensor, "<f4").tobytes() for tensor in tensors.values())
+    ).hexdigest()
     values = dict(description["metadata"])
     values["architecture"] = json.dumps(values["architecture"])
     values["floats"] = str(sum(tensor.size for tensor in tensors.values()))
@@ -132,4 +145,6 @@ def convert(kind, path, output):
         check_tensor(path, tensor, tensors[tensor], shape)
     values = metadata(path, description, tensors)
     tensorfile.write(output, tensors, values)
-    print(f"{output}: {name}, {len(tensors)} tensors, {values['floats']} floats; {values['source']}")
+    print(
+        f"{output}: {name}, {len(tensors)} tensors, {values['floats']} floats; {values['source']}"
+    )

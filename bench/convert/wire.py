@@ -42,7 +42,7 @@ def fields(data):
                 size, at = varint(data, at)
             if size > len(data) - at:
                 raise WireError(f"field {number} wants {size} bytes, {len(data) - at} are left")
-            value, at = data[at: at + size], at + size
+            value, at = data[at : at + size], at + size
         else:
             raise WireError(f"field {number} has type {kind}")
         yield number, kind, value
@@ -51,6 +51,17 @@ def fields(data):
 def messages(data, number):
     """The length-delimited values of one field, in order."""
     return [value for n, kind, value in fields(data) if n == number and kind == 2]
+
+
+def integers(data):
+    """{number: value} of the varint fields; the last one counts."""
+    return {number: value for number, kind, value in fields(data) if kind == 0}
+
+
+def texts(data):
+    """{number: text} of the length-delimited fields that are UTF-8; the last one counts."""
+    found = {number: bytes(value) for number, kind, value in fields(data) if kind == 2}
+    return {number: value.decode("utf-8", "replace") for number, value in found.items()}
 
 
 def signed(value):
