@@ -379,6 +379,8 @@ class Dlf(Case):
         with open(path, "ab") as file:
             file.write(b"x")
         self.refused("dlf", path, says=["zstd: bytes after the end"])
+        os.truncate(path, os.path.getsize(path) - 2)
+        self.refused("dlf", path, says=["zstd: truncated: the frame does not end"])
         with open(path, "wb") as file:
             file.write(b"PK\3\4 no zstd at all")
         self.refused("dlf", path, says=["zstd"])
@@ -702,9 +704,28 @@ def network_tensors(name, seed=5):
     }
 
 
+def dmcf_paths():
+    """{tensor: attribute path}, by the order in which DMCF's constructors make the layers."""
+    paths = {"sym0.kernel_half": "model/sym_convs/0/kernel"}
+    for kind in ("kernel", "bias"):
+        for name, path in (("fluid", "fluid"), ("obstacle", "obs")):
+            paths[f"conv_{name}.{kind}"] = f"model/{path}_convs/{kind}"
+            paths[f"dense_{name}.{kind}"] = f"model/{path}_dense/{kind}"
+        branches = [1, 3, 3, 1]  # of the inputs of l1, l2, l3, and of the last output
+        for layer in range(3):
+            for target in range(branches[layer + 1]):
+                for source in range(branches[layer]):
+                    tail = f"{layer}/{target}/0/{source}/{kind}"
+                    paths[f"l{layer + 1}.conv_{source}_{target}.{kind}"] = f"model/convs/{tail}"
+                    if source == target:
+                        paths[f"l{layer + 1}.dense_{source}.{kind}"] = f"model/denses/{tail}"
+    return paths
+
+
 def dmcf_variables(tensors):
     """A checkpoint's variables; optimizer and counter too, which are not converted."""
-    variables = {weights.dmcf_object(name): tensor for name, tensor in tensors.items()}
+    paths = dmcf_paths()
+    variables = {paths[name]: tensor for name, tensor in tensors.items()}
     variables["optimizer/iter"] = np.int64(150000)
     variables["save_counter"] = np.int64(50)
     return variables
