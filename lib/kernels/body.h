@@ -289,6 +289,9 @@ static void multiply_stretch(const float *in, size_t in_stride, size_t n, size_t
                              const float *weight, size_t b, float *out, size_t out_stride)
 {
     size_t c = 0;
+#ifdef MULTIPLY_FIRST /* a variant may take the first columns with tiles of its own */
+    c = MULTIPLY_FIRST(in, in_stride, n, a, weight, b, out, out_stride);
+#endif
 #define ROWS(tile, rows)                                                                           \
     for (; r + rows <= n; r += rows)                                                               \
         tile(in + r * in_stride, in_stride, a, weight + c, b, out + r * out_stride + c, out_stride);
