@@ -12,12 +12,6 @@
 /* Floats between the columns of a tile beyond their length, so that they do not collide in the cache. */
 #define COLUMN_PADDING 16
 
-#if defined(__GNUC__)
-#define MARK(flag) __atomic_store_n(&(flag), (uint8_t)1, __ATOMIC_RELAXED)
-#else
-#define MARK(flag) ((flag) = 1)
-#endif
-
 int32_t ascc_network_set(const ascc_network *network, int32_t value)
 {
     return value < 2 ? value : network->plan->layer[value - 2].set;
@@ -230,17 +224,27 @@ typedef struct mark_job {
     const ascc_rows *rows;
     const uint8_t *active;
     uint8_t *source;
+    atomic_size_t left; /* rows of the source not marked yet */
 } mark_job;
 
 static void mark_neighbors(void *data, size_t begin, size_t end, int32_t slot)
 {
     (void)slot;
-    const mark_job *job = data;
+    mark_job *job = data;
     const ascc_rows *rows = job->rows;
-    for (size_t i = begin; i < end; i++)
-        if (job->active[i])
-            for (uint32_t k = 0; k < rows->count[i]; k++)
-                MARK(job->source[rows->neighbor[rows->start[i] + k]]);
+    for (size_t i = begin; i < end; i++) {
+        if (!job->active[i])
+            continue;
+        if (!atomic_load_explicit(&job->left, memory_order_relaxed))
+            return;
+        const uint32_t *neighbor = rows->neighbor + rows->start[i];
+        for (uint32_t k = 0; k < rows->count[i]; k++) {
+            uint8_t *flag = &job->source[neighbor[k]];
+            if (!__atomic_load_n(flag, __ATOMIC_RELAXED) &&
+                !__atomic_exchange_n(flag, (uint8_t)1, __ATOMIC_RELAXED))
+                atomic_fetch_sub_explicit(&job->left, 1, memory_order_relaxed);
+        }
+    }
 }
 
 /* Makes the rows of the active queries and marks what they read. */
@@ -251,9 +255,10 @@ static ascc_status demand_rows(ascc_network_run *run, int32_t key, const uint8_t
     const ascc_status status = ascc_rows_make(rows, run->tools, active);
     if (status != ASCC_OK)
         return status;
-    if (!memchr(source, 0, rows->source->count))
-        return ASCC_OK; /* all are read already */
-    mark_job job = {rows, active, source};
+    size_t left = 0;
+    for (size_t i = 0; i < rows->source->count; i++)
+        left += !source[i];
+    mark_job job = {rows, active, source, left};
     ascc_workers_run(run->tools->workers, rows->query->count, 1024, mark_neighbors, &job);
     return ASCC_OK;
 }

@@ -63,9 +63,8 @@ static void map_volume(float *RESTRICT px, float *RESTRICT py, float *RESTRICT p
         const float az = fabsf(z);
         const int cap = 1.25f * (z * z) > h2;
         const int center = n2 < 1e-12f;
-        const float s_cap = sqrtf(3.0f * n / (center ? 1.0f : n + az));
-        const float s_side = n / (cap | center ? 1.0f : sqrtf(h2));
-        const float s = center ? 0.0f : cap ? s_cap : s_side;
+        const float above = cap ? 3.0f * n : n2, below = cap ? n + az : h2;
+        const float s = center ? 0.0f : sqrtf(above / (center ? 1.0f : below));
         z = center ? 0.0f : cap ? copysignf(n, z) : 1.5f * z;
         x *= s;
         y *= s;
@@ -138,53 +137,33 @@ typedef struct corners {
     float weight[8][LANES];
 } corners;
 
-/* Lower cell and fraction along an axis of `size` cells (align corners). At the upper end the last
- * cell has the fraction 1. */
-static inline void axis_cells(float p, int32_t size, int32_t *low, float *fraction)
+/* Lower cells and fractions of eight neighbours along an axis of `size` cells (align corners). At the
+ * upper end the last cell has the fraction 1. */
+static inline vector axis_cells(const float *p, int32_t size, vector *fraction)
 {
-    const float c = (p * 0.5f + 0.5f) * (float)(size - 1);
-    const int32_t last = size > 1 ? size - 2 : 0;
-    int32_t i = (int32_t)c;
-    i = i > 0 ? i : 0;
-    i = i < last ? i : last;
-    float t = c - (float)i;
-    t = t > 0.0f ? t : 0.0f;
-    t = t < 1.0f ? t : 1.0f;
-    *low = i;
-    *fraction = t;
+    const vector zero = fill(0.0f), half = fill(0.5f);
+    const vector c = times(add(times(load(p), half), half), fill((float)(size - 1)));
+    const vector low = whole(smaller(larger(c, zero), fill(size > 1 ? (float)(size - 2) : 0.0f)));
+    *fraction = smaller(larger(minus(c, low), zero), fill(1.0f));
+    return low;
 }
 
-/* Corners of neighbours [0, n), n <= 8; the rest of the lanes repeats lane 0. */
-static inline void find_corners(const float *RESTRICT x, const float *RESTRICT y,
-                                const float *RESTRICT z, const float *RESTRICT window, size_t n,
-                                const int32_t cells[3], corners *RESTRICT out)
+/* Corners of eight neighbours. */
+static inline void find_corners(const float *x, const float *y, const float *z, const float *window,
+                                const int32_t cells[3], corners *out)
 {
-    float px[LANES], py[LANES], pz[LANES], scale[LANES];
-    for (size_t i = 0; i < LANES; i++) {
-        const size_t k = i < n ? i : 0;
-        px[i] = x[k];
-        py[i] = y[k];
-        pz[i] = z[k];
-        scale[i] = window ? window[k] : 1.0f;
-    }
-    const int32_t w = cells[0], wh = w * cells[1];
-    for (size_t i = 0; i < LANES; i++) {
-        int32_t ix, iy, iz;
-        float tx, ty, tz;
-        axis_cells(px[i], cells[0], &ix, &tx);
-        axis_cells(py[i], cells[1], &iy, &ty);
-        axis_cells(pz[i], cells[2], &iz, &tz);
-        const float sx = 1.0f - tx, sy = 1.0f - ty;
-        const float z0 = (1.0f - tz) * scale[i], z1 = tz * scale[i];
-        out->cell[i] = iz * wh + iy * w + ix;
-        out->weight[0][i] = sx * sy * z0;
-        out->weight[1][i] = tx * sy * z0;
-        out->weight[2][i] = sx * ty * z0;
-        out->weight[3][i] = tx * ty * z0;
-        out->weight[4][i] = sx * sy * z1;
-        out->weight[5][i] = tx * sy * z1;
-        out->weight[6][i] = sx * ty * z1;
-        out->weight[7][i] = tx * ty * z1;
+    const vector one = fill(1.0f), scale = window ? load(window) : one;
+    vector tx, ty, tz;
+    const vector ix = axis_cells(x, cells[0], &tx), iy = axis_cells(y, cells[1], &ty);
+    const vector iz = axis_cells(z, cells[2], &tz);
+    const vector row = fill((float)cells[0]);
+    store_whole(out->cell, add(times(add(times(iz, fill((float)cells[1])), iy), row), ix));
+    const vector sx = minus(one, tx), sy = minus(one, ty);
+    const vector z0 = times(minus(one, tz), scale), z1 = times(tz, scale);
+    const vector plane[4] = {times(sx, sy), times(tx, sy), times(sx, ty), times(tx, ty)};
+    for (size_t i = 0; i < 4; i++) {
+        store(out->weight[i], times(plane[i], z0));
+        store(out->weight[4 + i], times(plane[i], z1));
     }
 }
 
@@ -231,7 +210,7 @@ static void gather(const ascc_pairs *pairs, const float *window, const uint32_t 
     for (size_t i = 0; i < k; i += LANES) {
         const size_t n = k - i < LANES ? k - i : LANES;
         corners at;
-        find_corners(pairs->x + i, pairs->y + i, pairs->z + i, window ? window + i : NULL, n, cells,
+        find_corners(pairs->x + i, pairs->y + i, pairs->z + i, window ? window + i : NULL, cells,
                      &at);
         for (size_t l = 0; l < n; l++) {
             const float *f = feature + (size_t)neighbor[i + l] * a, *w = at.weight[0] + l;
@@ -330,7 +309,7 @@ static void pair_terms(const ascc_pairs *pairs, const float *window, const uint3
     for (size_t i = 0; i < k; i += LANES) {
         const size_t n = k - i < LANES ? k - i : LANES;
         corners at;
-        find_corners(pairs->x + i, pairs->y + i, pairs->z + i, window ? window + i : NULL, n, cells,
+        find_corners(pairs->x + i, pairs->y + i, pairs->z + i, window ? window + i : NULL, cells,
                      &at);
         for (size_t l = 0; l < n; l++) {
             const float *f = feature + (size_t)neighbor[i + l] * a;
