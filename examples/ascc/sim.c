@@ -350,8 +350,10 @@ static void print_momentum(const simulation *s)
            " quanta of %.3g kg m/s%s)\n",
            sqrt(drift) / (sqrt(start) + 1e-10), s->drift[0], s->drift[1], s->drift[2], q,
            info.conserves_momentum ? "" : "; this model does not conserve it");
-    if (!weightless(s))
+    if (!weightless(s)) {
+        printf("angular mom. error  not measured: gravity or walls turn the fluid\n");
         return;
+    }
     double turn = 0.0;
     for (int c = 0; c < 3; c++)
         turn += pow(s->last.angular_momentum[c] - s->first.angular_momentum[c], 2.0);
