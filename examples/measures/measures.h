@@ -101,8 +101,8 @@ ascc_status ascc_measure_emd_exact(const ascc_measure_set *a, const ascc_measure
 
 /** How ascc_measure_sinkhorn works; zero is the default of each. */
 typedef struct ascc_measure_sinkhorn_options {
-    double epsilon;     /* blur, m; required: a quarter of the spacing is what `ascc eval` uses */
-    double tolerance;   /* of the marginals' total mass, on which to stop; 0 = 1e-4 */
+    double epsilon;     /* blur, m; required: half a spacing is what `ascc eval` uses */
+    double tolerance;   /* of the marginals' total mass, on which to stop; 0 = 1e-3 */
     int32_t iterations; /* at most, at the last epsilon; 0 = 1000 */
     int32_t threads;
 } ascc_measure_sinkhorn_options;

@@ -216,9 +216,12 @@ ascc_status ascc_measure_emd_exact(const ascc_measure_set *a, const ascc_measure
 
 /* ---- Entropic -------------------------------------------------------------------------------- */
 
-enum { CHUNK = 256, WARM_ITERATIONS = 2 };
+enum { CHUNK = 64, WARM_ITERATIONS = 2 };
+/* Terms below exp(-NEGLIGIBLE) of the greatest are left out, a whole chunk at a time. */
+static const double NEGLIGIBLE = 45.0;
 
-/* One side: its points as separate coordinates, and its potential. */
+/* One side: its points as separate coordinates, in an order in which chunks are compact, and its
+ * potential. */
 typedef struct side {
     size_t count;
     double *x, *y, *z, *potential, *update;
@@ -279,9 +282,12 @@ static void soft_minimum(void *data, size_t begin, size_t end)
                 value[j] =
                     (from->potential[first + j] - sqrt(ex * ex + ey * ey + ez * ez)) * inverse;
             }
-            double highest = greatest;
+            double highest = -DBL_MAX;
             for (size_t j = 0; j < count; j++)
                 highest = value[j] > highest ? value[j] : highest;
+            if (highest < greatest - NEGLIGIBLE)
+                continue;
+            highest = highest > greatest ? highest : greatest;
             for (size_t j = 0; j < count; j++) {
                 const double e = value[j] - highest;
                 value[j] = exp_small(e > -700.0 ? e : -700.0);
@@ -383,23 +389,29 @@ static double transport_self(const side *a, const schedule *plan, double *residu
     return mean_of(a->potential, a->count) + mean_of(a->update, a->count);
 }
 
-static bool open_side(side *s, const ascc_measure_set *set)
+static ascc_status open_side(side *s, const ascc_measure_set *set)
 {
     const size_t n = set->count, d = (size_t)set->dimension;
+    ascc_measure_tree tree;
+    const ascc_status status =
+        ascc_measure_tree_build(&tree, set->dimension, set->count, set->position);
+    if (status != ASCC_OK)
+        return status;
     s->count = n;
     s->x = calloc(5 * n, sizeof *s->x);
-    if (!s->x)
-        return false;
-    s->y = s->x + n;
-    s->z = s->y + n;
-    s->potential = s->z + n;
-    s->update = s->potential + n;
-    for (size_t i = 0; i < n; i++) {
-        s->x[i] = set->position[i * d];
-        s->y[i] = set->position[i * d + 1];
-        s->z[i] = d == 3 ? set->position[i * d + 2] : 0.0;
+    if (s->x) {
+        s->y = s->x + n;
+        s->z = s->y + n;
+        s->potential = s->z + n;
+        s->update = s->potential + n;
+        for (size_t i = 0; i < n; i++) {
+            s->x[i] = tree.position[i * d];
+            s->y[i] = tree.position[i * d + 1];
+            s->z[i] = d == 3 ? tree.position[i * d + 2] : 0.0;
+        }
     }
-    return true;
+    ascc_measure_tree_free(&tree);
+    return s->x ? ASCC_OK : ASCC_ERROR_MEMORY;
 }
 
 /* Diagonal of the box around both. */
@@ -436,11 +448,13 @@ ascc_status ascc_measure_sinkhorn(const ascc_measure_set *a, const ascc_measure_
         !ascc_measure_finite(b->position, b->count * d))
         return ASCC_ERROR_NOT_FINITE;
     const schedule plan = {fmax(extent_of(a, b), options->epsilon), options->epsilon,
-                           options->tolerance > 0.0 ? options->tolerance : 1e-4,
+                           options->tolerance > 0.0 ? options->tolerance : 1e-3,
                            options->iterations ? options->iterations : 1000, options->threads};
     side side_a = {0}, side_b = {0};
-    ascc_status status = ASCC_ERROR_MEMORY;
-    if (open_side(&side_a, a) && open_side(&side_b, b)) {
+    ascc_status status = open_side(&side_a, a);
+    if (status == ASCC_OK)
+        status = open_side(&side_b, b);
+    if (status == ASCC_OK) {
         double residual_a, residual_b;
         const double self_a = transport_self(&side_a, &plan, &residual_a);
         const double self_b = transport_self(&side_b, &plan, &residual_b);
