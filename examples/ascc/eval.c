@@ -27,7 +27,13 @@ static const size_t ENERGY_FRAMES[] = {0,  5,   10,  20,  30,  40,  50, 75,
 /* Frames after which the mean error of the rollout is reported. */
 static const size_t ERROR_FRAMES[] = {1, 2, 5, 10, 20, 50};
 
-enum { MOST_SEQUENCES = 256, SUBSET = 2000, COLUMNS = 5 };
+enum {
+    ENERGY_COUNT = sizeof ENERGY_FRAMES / sizeof *ENERGY_FRAMES,
+    ERROR_COUNT = sizeof ERROR_FRAMES / sizeof *ERROR_FRAMES,
+    MOST_SEQUENCES = 256,
+    SUBSET = 2000, /* particles of an exact assignment where all are too many */
+    COLUMNS = 5
+};
 
 typedef struct options {
     const char *method, *json, *csv;
@@ -211,6 +217,7 @@ static void short_term(bench *b, ascc_velocity_kind kind)
 typedef struct rollout {
     size_t last;    /* frame reached */
     size_t counted; /* frames in the sums below: 1 to last */
+    size_t published_count;
     size_t non_finite, escaped, escaped_most;
     double farthest, nearest_sum, jsd, jsd_sum;
     double density_most[2]; /* published kind, of prediction and truth, over all frames */
@@ -219,7 +226,21 @@ typedef struct rollout {
     double energy_gain, max_speed;
     double momentum_sum, angular_sum, drift, balance;
     double start_energy, start_momentum[3], last_momentum[3], external[3];
+    double kinetic[ENERGY_COUNT], error[ERROR_COUNT], rmse[ERROR_COUNT];
+    double chamfer_second[2], density_second[2]; /* after one second */
+    double chamfer_final[2], offset[3];
 } rollout;
+
+static size_t one_second(const truth *t)
+{
+    return (size_t)(1.0 / t->scene.time_step + 0.5);
+}
+
+/* The frames of the published networks' density figures: every other one, and the last. */
+static bool published_samples(const truth *t, size_t frame)
+{
+    return frame % 2 == 0 || frame + 1 == t->frames;
+}
 
 static double greatest(const double *values, size_t count)
 {
@@ -240,18 +261,21 @@ static void measure_densities(bench *b, const ascc_measure_set *predicted,
     (void)ascc_measure_density(predicted, 0, NULL, radius, threads, b->density[0]);
     (void)ascc_measure_density(real, 0, NULL, radius, threads, b->density[1]);
     (void)ascc_measure_compare_density(n, b->density[0], n, b->density[1], rest, &error);
-    r->density_maximum_sum += error.maximum;
+    r->density_maximum_sum += error.maximum; /* 0 at frame 0 */
     r->density_mean_sum += error.mean;
-    if (frame == (size_t)(1.0 / scene->time_step + 0.5)) {
-        ascc_report_add(b->run, error.maximum, "density_max_error_1s");
-        ascc_report_add(b->run, error.mean, "density_mean_error_1s");
+    if (frame == one_second(b->truth)) {
+        r->density_second[0] = error.maximum;
+        r->density_second[1] = error.mean;
     }
+    if (!published_samples(b->truth, frame))
+        return;
     (void)ascc_measure_density(predicted, scene->wall_count, scene->wall, radius, threads,
                                b->density[0]);
     (void)ascc_measure_density(real, scene->wall_count, scene->wall, radius, threads,
                                b->density[1]);
     (void)ascc_measure_compare_density(n, b->density[0], n, b->density[1], rest, &error);
     r->published_sum += error.published;
+    r->published_count++;
     for (int k = 0; k < 2; k++)
         r->density_most[k] = fmax(r->density_most[k], greatest(b->density[k], n));
 }
@@ -261,26 +285,21 @@ static void measure_shape(bench *b, const ascc_measure_set *predicted, const asc
 {
     const int32_t threads = b->options->threads;
     const double spacing = b->truth->scene.spacing;
-    double forth, back, mean;
+    double forth, back;
     ascc_measure_pair_spacing pairs;
     (void)ascc_measure_chamfer(real, predicted, threads, &forth, &back);
     r->nearest_sum += forth;
-    (void)ascc_measure_mean_distance(predicted, real, &mean);
-    for (size_t k = 0; k < sizeof ERROR_FRAMES / sizeof *ERROR_FRAMES; k++)
+    for (size_t k = 0; k < ERROR_COUNT; k++)
         if (ERROR_FRAMES[k] == frame) {
-            double rmse;
-            (void)ascc_measure_rmse(predicted, real, &rmse);
-            ascc_report_add(b->run, mean, "mean_error_%zu", frame);
-            ascc_report_add(b->run, rmse, "rmse_%zu", frame);
+            (void)ascc_measure_mean_distance(predicted, real, &r->error[k]);
+            (void)ascc_measure_rmse(predicted, real, &r->rmse[k]);
         }
-    if (frame == (size_t)(1.0 / b->truth->scene.time_step + 0.5)) {
-        ascc_report_add(b->run, forth, "chamfer_1s_gt2pred");
-        ascc_report_add(b->run, back, "chamfer_1s_pred2gt");
+    if (frame == one_second(b->truth)) {
+        r->chamfer_second[0] = forth;
+        r->chamfer_second[1] = back;
     }
-    if (frame + 1 == b->truth->frames) {
-        ascc_report_add(b->run, forth, "chamfer_final_gt2pred");
-        ascc_report_add(b->run, back, "chamfer_final_pred2gt");
-    }
+    r->chamfer_final[0] = forth;
+    r->chamfer_final[1] = back;
     if (ascc_measure_pairs(predicted, spacing, threads, &pairs) == ASCC_OK) {
         r->min_distance = fmin(r->min_distance, pairs.min_distance);
         r->close_sum += pairs.close_fraction;
@@ -306,9 +325,11 @@ static void measure_motion(bench *b, const ascc_measure_set *predicted,
     ascc_measure_motion_sums p, t;
     (void)ascc_measure_motion(predicted, b->truth->scene.gravity, &p);
     (void)ascc_measure_motion(real, b->truth->scene.gravity, &t);
-    for (size_t k = 0; k < sizeof ENERGY_FRAMES / sizeof *ENERGY_FRAMES; k++)
+    for (size_t k = 0; k < ENERGY_COUNT; k++)
         if (ENERGY_FRAMES[k] == frame)
-            ascc_report_add(b->run, p.kinetic, "kinetic_%zu", frame);
+            r->kinetic[k] = p.kinetic;
+    for (int c = 0; c < 3; c++)
+        r->offset[c] = p.center[c] - t.center[c];
     r->max_speed = fmax(r->max_speed, p.max_speed);
     if (frame == 0) {
         r->start_energy = p.kinetic + p.potential;
@@ -329,9 +350,6 @@ static void measure_motion(bench *b, const ascc_measure_set *predicted,
                           ascc_measure_wall_balance(r->last_momentum, p.momentum, external, wall));
         memcpy(r->last_momentum, p.momentum, sizeof p.momentum);
     }
-    if (frame + 1 == b->truth->frames)
-        for (int c = 0; c < b->truth->scene.dimension; c++)
-            ascc_report_add(b->run, p.center[c] - t.center[c], "com_offset_%c", "xyz"[c]);
 }
 
 /* Escapes and non-finite values first, from the numbers as they are. */
@@ -352,10 +370,10 @@ static void measure_frame(bench *b, size_t frame, rollout *r)
     r->escaped_most = escape.count > r->escaped_most ? escape.count : r->escaped_most;
     r->farthest = fmax(r->farthest, escape.farthest);
     measure_motion(b, &predicted, &real, frame, r);
+    measure_densities(b, &predicted, &real, frame, r);
     if (frame == 0)
         return;
     measure_shape(b, &predicted, &real, frame, r);
-    measure_densities(b, &predicted, &real, frame, r);
     measure_speeds(&predicted, &real, r);
     r->counted++;
 }
@@ -394,6 +412,31 @@ static void measure_transport(bench *b)
     ascc_report_add(b->run, result.residual, "sinkhorn_residual");
 }
 
+/* The figures at certain frames; those beyond the sequence are left out, those not reached are NaN. */
+static void report_frames(bench *b, const rollout *r)
+{
+    ascc_report_run *run = b->run;
+    const size_t frames = b->truth->frames, second = one_second(b->truth);
+    const bool complete = r->last + 1 == frames;
+    for (size_t k = 0; k < ERROR_COUNT && ERROR_FRAMES[k] < frames; k++)
+        ascc_report_add(run, r->error[k], "mean_error_%zu", ERROR_FRAMES[k]);
+    for (size_t k = 0; k < ERROR_COUNT && ERROR_FRAMES[k] < frames; k++)
+        ascc_report_add(run, r->rmse[k], "rmse_%zu", ERROR_FRAMES[k]);
+    if (second < frames) {
+        ascc_report_add(run, r->chamfer_second[0], "chamfer_1s_gt2pred");
+        ascc_report_add(run, r->chamfer_second[1], "chamfer_1s_pred2gt");
+        ascc_report_add(run, r->density_second[0], "density_max_error_1s");
+        ascc_report_add(run, r->density_second[1], "density_mean_error_1s");
+    }
+    ascc_report_add(run, complete ? r->chamfer_final[0] : NAN, "chamfer_final_gt2pred");
+    ascc_report_add(run, complete ? r->chamfer_final[1] : NAN, "chamfer_final_pred2gt");
+    ascc_report_add(run, complete ? r->jsd : NAN, "jsd_final");
+    for (int c = 0; c < b->truth->scene.dimension; c++)
+        ascc_report_add(run, complete ? r->offset[c] : NAN, "com_offset_%c", "xyz"[c]);
+    for (size_t k = 0; k < ENERGY_COUNT && ENERGY_FRAMES[k] < frames; k++)
+        ascc_report_add(run, r->kinetic[k], "kinetic_%zu", ENERGY_FRAMES[k]);
+}
+
 static void report_rollout(bench *b, const rollout *r)
 {
     ascc_report_run *run = b->run;
@@ -407,11 +450,10 @@ static void report_rollout(bench *b, const rollout *r)
     ascc_report_add(run, r->nearest_sum / n, "gt2pred_mean");
     ascc_report_add(run, fabs(r->density_most[0] - r->density_most[1]) / r->density_most[1],
                     "published_density_error");
-    ascc_report_add(run, r->published_sum / n, "published_density_frames");
+    ascc_report_add(run, r->published_sum / (double)r->published_count, "published_density_frames");
     ascc_report_add(run, r->density_maximum_sum / n, "density_max_error");
     ascc_report_add(run, r->density_mean_sum / n, "density_mean_error");
     ascc_report_add(run, r->jsd_sum / n, "jsd_mean");
-    ascc_report_add(run, complete ? r->jsd : NAN, "jsd_final");
     ascc_report_add(run, r->min_distance, "min_pair_distance");
     ascc_report_add(run, r->close_sum / n, "close_pairs_mean");
     ascc_report_add(run, r->tight_most, "tight_pairs_max");
@@ -421,6 +463,13 @@ static void report_rollout(bench *b, const rollout *r)
     ascc_report_add(run, r->angular_sum / n, "angular_error");
     ascc_report_add(run, b->method->impulses ? r->drift : NAN, "momentum_drift_max");
     ascc_report_add(run, b->method->impulses ? r->balance : NAN, "wall_balance_max");
+    report_frames(b, r);
+}
+
+static void fill_nan(double *values, size_t count)
+{
+    for (size_t i = 0; i < count; i++)
+        values[i] = NAN;
 }
 
 static void run_rollout(bench *b)
@@ -428,6 +477,11 @@ static void run_rollout(bench *b)
     const truth *t = b->truth;
     rollout r = {.min_distance = INFINITY};
     ascc_method_error why = {""};
+    fill_nan(r.kinetic, ENERGY_COUNT);
+    fill_nan(r.error, ERROR_COUNT);
+    fill_nan(r.rmse, ERROR_COUNT);
+    fill_nan(r.chamfer_second, 2);
+    fill_nan(r.density_second, 2);
     memcpy(b->position, t->position, row_of(t) * sizeof(double));
     memset(b->velocity, 0, row_of(t) * sizeof(double));
     if (t->velocity_frames)

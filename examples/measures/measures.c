@@ -31,29 +31,29 @@ typedef struct escape_job {
     const ascc_measure_set *set;
     const ascc_measure_tree *tree;
     const double *wall, *normal;
-    double margin;
+    double width;    /* m, over which the weights fall to 0 */
     double *outside; /* [count], m; negative = inside */
+    double *nearest; /* [count], m; to a wall point */
 } escape_job;
 
-typedef struct escape_choice {
+/* Weighted mean of n . (x - w) over the wall points near the nearest one. */
+typedef struct wall_mean {
     const escape_job *job;
     const double *point;
-    double along; /* n . (x - w) of the wall point chosen */
-    size_t row;
-} escape_choice;
+    double nearest, sum, weight;
+} wall_mean;
 
-static void choose_wall(void *data, size_t row, double square)
+static void add_wall(void *data, size_t row, double square)
 {
-    escape_choice *c = data;
-    const size_t d = (size_t)c->job->set->dimension;
+    wall_mean *m = data;
+    const size_t d = (size_t)m->job->set->dimension;
+    const double t = 1.0 - (sqrt(square) - m->nearest) / m->job->width;
     double along = 0.0;
-    (void)square;
     for (size_t k = 0; k < d; k++)
-        along += c->job->normal[row * d + k] * (c->point[k] - c->job->wall[row * d + k]);
-    const double gain = fabs(along) - fabs(c->along);
-    if (gain > 0.0 || (gain == 0.0 && row < c->row)) {
-        c->along = along;
-        c->row = row;
+        along += m->job->normal[row * d + k] * (m->point[k] - m->job->wall[row * d + k]);
+    if (t > 0.0) {
+        m->sum += t * t * along;
+        m->weight += t * t;
     }
 }
 
@@ -66,11 +66,12 @@ static void find_outside(void *data, size_t begin, size_t end)
         job->outside[i] = -INFINITY;
         if (!ascc_measure_finite(point, d))
             continue;
-        const double reach =
-            sqrt(ascc_measure_tree_nearest(job->tree, point, SIZE_MAX)) + job->margin;
-        escape_choice choice = {job, point, 0.0, SIZE_MAX};
-        ascc_measure_tree_within(job->tree, point, reach * reach, choose_wall, &choice);
-        job->outside[i] = -choice.along;
+        wall_mean mean = {job, point, sqrt(ascc_measure_tree_nearest(job->tree, point, SIZE_MAX)),
+                          0.0, 0.0};
+        const double reach = mean.nearest + job->width;
+        ascc_measure_tree_within(job->tree, point, reach * reach, add_wall, &mean);
+        job->outside[i] = -mean.sum / mean.weight;
+        job->nearest[i] = mean.nearest;
     }
 }
 
@@ -90,14 +91,17 @@ ascc_status ascc_measure_escapes(const ascc_measure_set *set, size_t wall_count,
     const ascc_status status = ascc_measure_tree_build(&tree, set->dimension, wall_count, wall);
     if (status != ASCC_OK)
         return status;
-    escape_job job = {set, &tree, wall, normal, 0.5 * spacing, NULL};
-    job.outside = malloc(set->count * sizeof *job.outside);
+    escape_job job = {.set = set, .tree = &tree, .wall = wall, .normal = normal};
+    job.width = 0.75 * spacing;
+    job.outside = malloc(2 * set->count * sizeof *job.outside);
     if (job.outside) {
+        job.nearest = job.outside + set->count;
         ascc_measure_parallel(threads, set->count, BLOCK, find_outside, &job);
-        for (size_t i = 0; i < set->count; i++) {
-            escape->count += job.outside[i] > job.margin;
-            escape->farthest = fmax(escape->farthest, job.outside[i]);
-        }
+        for (size_t i = 0; i < set->count; i++)
+            if (job.outside[i] > 0.5 * spacing) {
+                escape->count++;
+                escape->farthest = fmax(escape->farthest, job.nearest[i]);
+            }
     }
     ascc_measure_tree_free(&tree);
     free(job.outside);

@@ -41,16 +41,17 @@ size_t ascc_measure_non_finite(const ascc_measure_set *set);
 /** What ascc_measure_escapes finds. */
 typedef struct ascc_measure_escape {
     size_t count;    /* particles farther outside than half a spacing */
-    double farthest; /* the greatest distance outside, m; 0 if none is outside at all */
+    double farthest; /* from the nearest wall point, of those that escaped, m; 0 if none did */
 } ascc_measure_escape;
 
 /**
  * Counts particles outside the boundary.
  *
- * How far outside a particle is: of the wall points no farther from it than the nearest one plus half a
- * spacing, take the one to whose normal the offset x - w is most parallel (greatest |n . (x - w)|);
- * it is outside by -n . (x - w). Escaped: outside by more than half a spacing. So a scene without
- * walls has no escapes, and neither has what flies through an open top within the walls' outline.
+ * How far outside a particle x is: -sum k n . (x - w) / sum k over wall points w with normals n, with
+ * k = (1 - (|x - w| - nearest) / width)^2 where that is positive and width is 3/4 spacing: the signed
+ * distance to the nearest wall, smoothed over corners. Escaped: outside by more than half a spacing.
+ * So a scene without walls has no escapes, and neither has what flies through an open top within the
+ * walls' outline.
  *
  * wall      [wall_count][dimension], the layer of wall points that touches the fluid
  * normal    unit vectors into the fluid
