@@ -479,9 +479,9 @@ static ascc_status compute_layer(ascc_network_run *run, int32_t l, uint32_t *lis
     size_t longest = 0;
     for (int32_t t = layer->first_term; t < layer->first_term + layer->term_count; t++)
         if (plan->term[t].kind == ASCC_TERM_CONVOLUTION)
-            longest = ascc_max_size(
-                longest,
-                cell_count(&plan->term[t].filter) * (size_t)plan->term[t].inputs + COLUMN_PADDING);
+            longest = ascc_max_size(longest, cell_count(&plan->term[t].filter) *
+                                                     ascc_padded(plan->term[t].inputs) +
+                                                 COLUMN_PADDING);
     layer_job job = {.run = run, .layer = layer, .value = &run->value[l + 2], .list = list};
     const size_t slots = (size_t)ascc_workers_count(tools->workers);
     job.width = ascc_padded(layer->channels) + 8;
