@@ -16,10 +16,6 @@
 
 #include "measures.h"
 
-#ifndef ASCC_TEST_DATA
-#define ASCC_TEST_DATA "tests/data"
-#endif
-
 enum { MOST_ENTRIES = 64 };
 
 typedef struct golden_entry {
@@ -33,7 +29,7 @@ static size_t golden_count;
 
 static int load_golden(void **state)
 {
-    FILE *file = fopen(ASCC_TEST_DATA "/measures-golden.txt", "r");
+    FILE *file = fopen(SOURCE_ROOT "/tests/data/measures-golden.txt", "r");
     (void)state;
     if (!file)
         return -1;
