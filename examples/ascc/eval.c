@@ -37,6 +37,7 @@ enum {
 
 typedef struct options {
     const char *method, *json, *csv;
+    bool quiet;
     const char *sequence[MOST_SEQUENCES];
     size_t sequence_count;
     int32_t threads;
@@ -242,25 +243,44 @@ static bool published_samples(const truth *t, size_t frame)
     return frame % 2 == 0 || frame + 1 == t->frames;
 }
 
+/* fmax, but a NaN stays. */
+static double greater(double a, double b)
+{
+    return isnan(a) || a >= b ? a : b;
+}
+
 static double greatest(const double *values, size_t count)
 {
     double most = 0.0;
     for (size_t i = 0; i < count; i++)
-        most = fmax(most, values[i]);
+        most = greater(most, values[i]);
     return most;
+}
+
+/* Densities of prediction and truth into b->density, and their errors; all NaN if one has none. */
+static ascc_measure_density_error compare_densities(bench *b, const ascc_measure_set *predicted,
+                                                    const ascc_measure_set *real, size_t walls)
+{
+    const ascc_method_scene *scene = &b->truth->scene;
+    const double radius = 2.0 * scene->spacing;
+    const int32_t threads = b->options->threads;
+    const size_t n = scene->fluid_count;
+    ascc_measure_density_error error = {NAN, NAN, NAN, NAN};
+    if (ascc_measure_density(predicted, walls, scene->wall, radius, threads, b->density[0]) ==
+            ASCC_OK &&
+        ascc_measure_density(real, walls, scene->wall, radius, threads, b->density[1]) == ASCC_OK)
+        (void)ascc_measure_compare_density(n, b->density[0], n, b->density[1],
+                                           ascc_measure_rest_density(scene->dimension), &error);
+    else
+        b->density[0][0] = b->density[1][0] = NAN;
+    return error;
 }
 
 static void measure_densities(bench *b, const ascc_measure_set *predicted,
                               const ascc_measure_set *real, size_t frame, rollout *r)
 {
     const ascc_method_scene *scene = &b->truth->scene;
-    const double radius = 2.0 * scene->spacing, rest = ascc_measure_rest_density(scene->dimension);
-    const size_t n = scene->fluid_count;
-    const int32_t threads = b->options->threads;
-    ascc_measure_density_error error;
-    (void)ascc_measure_density(predicted, 0, NULL, radius, threads, b->density[0]);
-    (void)ascc_measure_density(real, 0, NULL, radius, threads, b->density[1]);
-    (void)ascc_measure_compare_density(n, b->density[0], n, b->density[1], rest, &error);
+    ascc_measure_density_error error = compare_densities(b, predicted, real, 0);
     r->density_maximum_sum += error.maximum; /* 0 at frame 0 */
     r->density_mean_sum += error.mean;
     if (frame == one_second(b->truth)) {
@@ -269,15 +289,12 @@ static void measure_densities(bench *b, const ascc_measure_set *predicted,
     }
     if (!published_samples(b->truth, frame))
         return;
-    (void)ascc_measure_density(predicted, scene->wall_count, scene->wall, radius, threads,
-                               b->density[0]);
-    (void)ascc_measure_density(real, scene->wall_count, scene->wall, radius, threads,
-                               b->density[1]);
-    (void)ascc_measure_compare_density(n, b->density[0], n, b->density[1], rest, &error);
+    error = compare_densities(b, predicted, real, scene->wall_count);
     r->published_sum += error.published;
     r->published_count++;
     for (int k = 0; k < 2; k++)
-        r->density_most[k] = fmax(r->density_most[k], greatest(b->density[k], n));
+        r->density_most[k] =
+            greater(r->density_most[k], greatest(b->density[k], scene->fluid_count));
 }
 
 static void measure_shape(bench *b, const ascc_measure_set *predicted, const ascc_measure_set *real,
@@ -304,7 +321,8 @@ static void measure_shape(bench *b, const ascc_measure_set *predicted, const asc
         r->min_distance = fmin(r->min_distance, pairs.min_distance);
         r->close_sum += pairs.close_fraction;
         r->tight_most = fmax(r->tight_most, pairs.tight_fraction);
-    }
+    } else
+        r->close_sum = NAN;
 }
 
 static void measure_speeds(const ascc_measure_set *predicted, const ascc_measure_set *real,
@@ -318,26 +336,38 @@ static void measure_speeds(const ascc_measure_set *predicted, const ascc_measure
     r->jsd_sum += r->jsd;
 }
 
+/* No sums from here on: a particle is lost. */
+static void lose_motion(rollout *r)
+{
+    r->momentum_sum = r->angular_sum = NAN;
+    r->energy_gain = r->max_speed = r->drift = r->balance = NAN;
+    for (int c = 0; c < 3; c++)
+        r->offset[c] = NAN;
+}
+
 /* Energy and momentum of the prediction, and against the truth if there is one to compare with. */
 static void measure_motion(bench *b, const ascc_measure_set *predicted,
                            const ascc_measure_set *real, size_t frame, rollout *r)
 {
     ascc_measure_motion_sums p, t;
-    (void)ascc_measure_motion(predicted, b->truth->scene.gravity, &p);
-    (void)ascc_measure_motion(real, b->truth->scene.gravity, &t);
+    if (ascc_measure_motion(predicted, b->truth->scene.gravity, &p) != ASCC_OK ||
+        ascc_measure_motion(real, b->truth->scene.gravity, &t) != ASCC_OK) {
+        lose_motion(r);
+        return;
+    }
     for (size_t k = 0; k < ENERGY_COUNT; k++)
         if (ENERGY_FRAMES[k] == frame)
             r->kinetic[k] = p.kinetic;
     for (int c = 0; c < 3; c++)
         r->offset[c] = p.center[c] - t.center[c];
-    r->max_speed = fmax(r->max_speed, p.max_speed);
+    r->max_speed = greater(r->max_speed, p.max_speed);
     if (frame == 0) {
         r->start_energy = p.kinetic + p.potential;
         memcpy(r->start_momentum, p.momentum, sizeof p.momentum);
         memcpy(r->last_momentum, p.momentum, sizeof p.momentum);
         return;
     }
-    r->energy_gain = fmax(r->energy_gain, p.kinetic + p.potential - r->start_energy);
+    r->energy_gain = greater(r->energy_gain, p.kinetic + p.potential - r->start_energy);
     r->momentum_sum += ascc_measure_momentum_error(&p, &t);
     r->angular_sum += ascc_measure_angular_error(&p, &t);
     if (b->method->impulses) {
@@ -345,9 +375,10 @@ static void measure_motion(bench *b, const ascc_measure_set *predicted,
         b->method->impulses(b->state, external, wall);
         for (int c = 0; c < 3; c++)
             r->external[c] += external[c] - wall[c];
-        r->drift = fmax(r->drift, ascc_measure_drift(p.momentum, r->start_momentum, r->external));
-        r->balance = fmax(r->balance,
-                          ascc_measure_wall_balance(r->last_momentum, p.momentum, external, wall));
+        r->drift =
+            greater(r->drift, ascc_measure_drift(p.momentum, r->start_momentum, r->external));
+        r->balance = greater(
+            r->balance, ascc_measure_wall_balance(r->last_momentum, p.momentum, external, wall));
         memcpy(r->last_momentum, p.momentum, sizeof p.momentum);
     }
 }
@@ -454,9 +485,9 @@ static void report_rollout(bench *b, const rollout *r)
     ascc_report_add(run, r->density_maximum_sum / n, "density_max_error");
     ascc_report_add(run, r->density_mean_sum / n, "density_mean_error");
     ascc_report_add(run, r->jsd_sum / n, "jsd_mean");
-    ascc_report_add(run, r->min_distance, "min_pair_distance");
+    ascc_report_add(run, isnan(r->close_sum) ? NAN : r->min_distance, "min_pair_distance");
     ascc_report_add(run, r->close_sum / n, "close_pairs_mean");
-    ascc_report_add(run, r->tight_most, "tight_pairs_max");
+    ascc_report_add(run, isnan(r->close_sum) ? NAN : r->tight_most, "tight_pairs_max");
     ascc_report_add(run, r->energy_gain, "energy_gain_max");
     ascc_report_add(run, r->max_speed, "max_speed");
     ascc_report_add(run, r->momentum_sum / n, "momentum_error");
@@ -551,6 +582,18 @@ static bool evaluate(const options *o, const ascc_method *method, const char *se
     return opened;
 }
 
+/* The method that a word means, and the settings in it; NULL if there is none. */
+static const ascc_method *find_method(const char *word, const char **settings)
+{
+    for (size_t k = 0; ascc_methods[k]; k++) {
+        const size_t length = strlen(ascc_methods[k]->prefix);
+        *settings = word + length;
+        if (strncmp(word, ascc_methods[k]->prefix, length) == 0)
+            return ascc_methods[k];
+    }
+    return NULL;
+}
+
 static int usage(FILE *file)
 {
     fputs("ascc eval METHOD SEQUENCE... [options]\n"
@@ -566,7 +609,8 @@ static int usage(FILE *file)
           "  --frames A:B:STEP  start frames of one- and two-frame errors, B not included\n"
           "  --velocity KIND    stored or difference: velocities these start with (both)\n"
           "  --transport        earth mover's distances of the last frame too: minutes\n"
-          "  --no-rollout       one- and two-frame errors only\n",
+          "  --no-rollout       one- and two-frame errors only\n"
+          "  --quiet            no table\n",
           file);
     return file == stdout ? 0 : 2;
 }
@@ -611,6 +655,8 @@ static bool read_arguments(int argc, char **argv, options *o)
     for (int i = 1; i < argc; i++) {
         if (strcmp(argv[i], "--transport") == 0)
             o->transport = true;
+        else if (strcmp(argv[i], "--quiet") == 0)
+            o->quiet = true;
         else if (strcmp(argv[i], "--no-rollout") == 0)
             o->no_rollout = true;
         else if (strncmp(argv[i], "--", 2) == 0) {
@@ -643,7 +689,8 @@ static void name_sequence(const char *path, char *name, size_t capacity)
 static bool write_reports(const options *o, const ascc_report_run *runs)
 {
     const size_t n = o->sequence_count;
-    ascc_report_table(stdout, o->method, runs, n, COLUMNS);
+    if (!o->quiet)
+        ascc_report_table(stdout, o->method, runs, n, COLUMNS);
     if (o->json && !ascc_report_json(o->json, o->method, runs, n)) {
         fprintf(stderr, "ascc eval: cannot write %s\n", o->json);
         return false;
@@ -663,7 +710,11 @@ int ascc_command_eval(int argc, char **argv)
     if (!read_arguments(argc, argv, &o))
         return usage(stderr);
     const char *settings;
-    const ascc_method *method = ascc_method_find(o.method, &settings);
+    const ascc_method *method = find_method(o.method, &settings);
+    if (!method) {
+        fprintf(stderr, "ascc eval: %s: no such method\n", o.method);
+        return 2;
+    }
     ascc_report_run *runs = calloc(o.sequence_count, sizeof *runs);
     bool fine = runs != NULL;
     for (size_t k = 0; k < o.sequence_count && fine; k++) {

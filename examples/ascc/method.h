@@ -1,8 +1,7 @@
 /* What `ascc eval` and the charts run: any way to advance a fluid by one frame.
  * SPDX-License-Identifier: MIT
  *
- * A new method is one ascc_method in a file of its own, a declaration below, and a line in the table
- * of methods.c. Positions and velocities are packed double[fluid_count][dimension], SI units.
+ * A new method is one ascc_method in a file of its own, a declaration below, and a line in methods.c. Positions and velocities are packed double[fluid_count][dimension], SI units.
  */
 #ifndef ASCC_METHOD_H
 #define ASCC_METHOD_H
@@ -55,11 +54,8 @@ typedef struct ascc_method {
     void (*close)(void *state);
 } ascc_method;
 
-/** All methods, NULL at the end. */
+/** All methods, NULL at the end: a word means the first whose prefix it begins with. */
 extern const ascc_method *const ascc_methods[];
-
-/** The method that a word on the command line means, and the settings in it. Never NULL. */
-const ascc_method *ascc_method_find(const char *word, const char **settings);
 
 extern const ascc_method ascc_method_ballistic, ascc_method_model;
 

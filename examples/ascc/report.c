@@ -30,7 +30,7 @@ static void table_cell(FILE *file, const ascc_figure *figure)
 {
     if (!figure)
         fprintf(file, " %14s", "");
-    else if (isnan(figure->value))
+    else if (!isfinite(figure->value))
         fprintf(file, " %14s", "-");
     else if (figure->value == floor(figure->value) && fabs(figure->value) < 1e6)
         fprintf(file, " %14.0f", figure->value);
