@@ -63,8 +63,11 @@ static void read_features(ascc_reader *reader, uint32_t object, const char *whos
 
 static void read_levels(ascc_reader *reader, uint32_t root, ascc_plan *plan)
 {
-    if (!ascc_reader_has(reader, root, "levels"))
+    if (!ascc_reader_has(reader, root, "levels")) {
+        if (ascc_reader_has(reader, root, "sampling"))
+            ascc_reader_fail(reader, "'sampling' without 'levels'");
         return;
+    }
     const uint32_t list = ascc_reader_array(reader, root, "levels");
     const uint32_t sampling = ascc_reader_object(reader, root, "sampling");
     if (reader->status != ASCC_OK)

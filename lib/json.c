@@ -1,6 +1,7 @@
 /* Reads JSON text from untrusted bytes into a flat list of values. SPDX-License-Identifier: MIT */
 #include "json.h"
 
+#include <float.h>
 #include <string.h>
 
 #define NONE UINT32_MAX
@@ -111,6 +112,21 @@ static uint64_t round_to_double(uint64_t q, int exponent, bool more)
     return base + kept + (up ? 1 : 0);
 }
 
+/* The usual case: an integer and a power of ten that doubles hold exactly need one rounding. */
+static bool convert_short(const char *digits, int count, int power, double *result)
+{
+    static const double powers[] = {1e0,  1e1,  1e2,  1e3,  1e4,  1e5,  1e6,  1e7,
+                                    1e8,  1e9,  1e10, 1e11, 1e12, 1e13, 1e14, 1e15,
+                                    1e16, 1e17, 1e18, 1e19, 1e20, 1e21, 1e22};
+    if (FLT_EVAL_METHOD != 0 || count > 15 || power < -22 || power > 22)
+        return false;
+    int64_t integer = 0;
+    for (int i = 0; i < count; i++)
+        integer = integer * 10 + (digits[i] - '0');
+    *result = power < 0 ? (double)integer / powers[-power] : (double)integer * powers[power];
+    return true;
+}
+
 /* digits 10^power, count <= ASCC_JSON_MAX_DIGITS digits of which the first is not 0. False if it is
  * too large for a double. */
 static bool convert(const char *digits, int count, int power, double *result)
@@ -120,6 +136,8 @@ static bool convert(const char *digits, int count, int power, double *result)
         return true;
     if (count + power > 310)
         return false;
+    if (convert_short(digits, count, power, result))
+        return true;
     large n = {{0}}, m = {{1}};
     for (int i = 0; i < count; i++)
         multiply_add(&n, 10u, (uint32_t)(digits[i] - '0'));

@@ -13,10 +13,9 @@
 #include <string.h>
 #include <cmocka.h>
 
+#include "commands.h"
 #include "method.h"
 #include "sequence.h"
-
-int ascc_command_eval(int argc, char **argv);
 
 /* ---- A method of one's own: the fluid stays where it is (docs/measures.md shows this) --------- */
 
@@ -171,11 +170,11 @@ static char *read_text(const char *path)
 /* Runs `ascc eval METHOD test_eval.safetensors --json PATH ...`. */
 static int evaluate(const char *method, const char *json, const char *option, const char *value)
 {
-    const char *arguments[8] = {"eval", method, "test_eval.safetensors", "--quiet", "--json", json,
-                                option, value};
-    char copy[8][64], *argv[9];
+    const char *arguments[7] = {method, "test_eval.safetensors", "--quiet", "--json", json, option,
+                                value};
+    char copy[7][64], *argv[8];
     int argc = 0;
-    for (; argc < 8 && arguments[argc]; argc++) {
+    for (; argc < 7 && arguments[argc]; argc++) {
         snprintf(copy[argc], sizeof copy[argc], "%s", arguments[argc]);
         argv[argc] = copy[argc];
     }

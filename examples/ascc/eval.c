@@ -8,9 +8,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "commands.h"
 #include "evaluate.h"
-
-int ascc_command_eval(int argc, char **argv);
 
 enum { MOST_SEQUENCES = 256, COLUMNS = 5 };
 
@@ -94,7 +93,7 @@ static bool read_option(const char *name, const char *value, options *o)
 
 static bool read_arguments(int argc, char **argv, options *o)
 {
-    for (int i = 1; i < argc; i++) {
+    for (int i = 0; i < argc; i++) {
         if (strcmp(argv[i], "--transport") == 0)
             o->measure.transport = true;
         else if (strcmp(argv[i], "--quiet") == 0)
@@ -147,7 +146,7 @@ static bool write_reports(const options *o, const ascc_report_run *runs)
 int ascc_command_eval(int argc, char **argv)
 {
     options o = {.threads = 1, .measure.velocity = -1};
-    if (argc > 1 && (strcmp(argv[1], "--help") == 0 || strcmp(argv[1], "-h") == 0))
+    if (argc > 0 && (strcmp(argv[0], "--help") == 0 || strcmp(argv[0], "-h") == 0))
         return usage(stdout);
     if (!read_arguments(argc, argv, &o))
         return usage(stderr);

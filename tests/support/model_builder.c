@@ -274,7 +274,7 @@ static void add_trunk_layer(random_network *n, int layer)
     const int last = layer == n->o.trunk_layers, c = n->o.channels;
     const int sources = layer == 1 ? 1 : n->o.levels;
     for (int d = 0; d < (last ? 1 : n->o.levels); d++) {
-        char points[16], name[32], source[32];
+        char points[16], name[48], source[48];
         snprintf(points, sizeof points, d ? "level%d" : n->o.fluid_only ? "fluid" : "all", d);
         const int width = last && n->o.plain ? n->o.dimension : c;
         model_text_add(&n->text,
@@ -347,7 +347,10 @@ static void add_output(random_network *n)
     model_text_add(&n->text, "}}");
 }
 
-unsigned char *model_builder_random(const model_random *options, size_t *size)
+/* With `network` the file describes itself by that text; with `described` the right one is handed
+ * out. */
+static unsigned char *random_file(const model_random *options, const char *network,
+                                  char **described, size_t *size)
 {
     random_network n = {.o = *options, .state = options->seed};
     model_random *o = &n.o;
@@ -376,9 +379,17 @@ unsigned char *model_builder_random(const model_random *options, size_t *size)
     add_output(&n);
     model_builder_metadata(&n.builder, "format", "ascc.model");
     model_builder_metadata(&n.builder, "version", "1");
-    model_builder_metadata(&n.builder, "network", n.text.text);
-    model_text_free(&n.text);
+    model_builder_metadata(&n.builder, "network", network ? network : n.text.text);
+    if (described)
+        *described = n.text.text;
+    else
+        model_text_free(&n.text);
     return model_builder_finish(&n.builder, size);
+}
+
+unsigned char *model_builder_random(const model_random *options, size_t *size)
+{
+    return random_file(options, NULL, NULL, size);
 }
 
 /* ---- Small networks described as the published ones --------------------------------------------- */
@@ -410,44 +421,45 @@ static void add_published(model_builder *builder, const char *architecture, cons
     add_replaced(builder, "architecture", architecture, from, to);
 }
 
+static const char dmcf_architecture[] =
+    "{\"network\": \"DMCF SymNet (HRNet trunk + antisymmetric output convolution), dim 3\", "
+    "\"timestep\": 0.02, \"gravity\": [0, -9.81, 0], "
+    "\"integration\": \"v2=v1+dt*g; p2=p1+dt*v2; p=p2+correction; v=(p-p1)/dt\", "
+    "\"features\": {\"fluid\": [\"1\", \"v2.x\", \"v2.y\", \"v2.z\"], "
+    "\"boundary\": [\"1\", \"n.x\", \"n.y\", \"n.z\"], \"use_vel\": true, \"use_acc\": false, "
+    "\"use_feats\": false, \"use_box_feats\": true, \"density_features\": false}, "
+    "\"use_boundary_in_all_layers\": true, "
+    "\"boundary_crop\": \"keep b iff min(p2)-0.8 <= b <= max(p2)+0.8 per axis\", "
+    "\"branches\": [{\"stride\": 1, \"radius\": 0.1, \"points\": \"fluid then kept "
+    "boundary\"}, {\"stride\": 2, \"radius\": 0.2, \"voxel\": 0.05}], "
+    "\"sampling\": {\"base_voxel\": 0.025, \"centralize\": true, \"hysteresis\": 0.1, "
+    "\"pad\": 0, \"source\": \"branch 0 points for every branch\"}, "
+    "\"cross_branch_radius\": \"radius of the coarser of the two branches\", "
+    "\"conv\": {\"kernel_size\": [2, 2, 2], \"window\": \"poly6: clip((1-q)^3,0,1), "
+    "q=d^2/r^2\", \"coordinate_mapping\": \"ball_to_cube_volume_preserving\", "
+    "\"interpolation\": \"trilinear, clamped\", \"align_corners\": true, "
+    "\"normalize\": false, \"ignore_query_point\": false, \"bias\": true}, "
+    "\"antisymmetric\": {\"kernel_size\": [2, 4, 2], "
+    "\"stored\": \"sym0.kernel_half [2,2,2,2,3]\", \"sym_axis\": 1, "
+    "\"full\": \"concat(axis=1: -half[::-1,::-1,::-1], half)\", "
+    "\"window\": \"peak: (1-sqrt(q))^2\", \"radius\": 0.1, \"ignore_query_point\": true, "
+    "\"bias\": false, "
+    "\"formula\": \"out_i = sum_k a_ik (f_i+f_k) g(x_k-x_i), f=relu(l2.out_0)\"}, "
+    "\"merge\": \"sum (add_merge)\", "
+    "\"activation\": \"relu on the input of every l1,l2 convolution/dense and of the "
+    "antisymmetric convolution; none on inputs of layer 0 and none on outputs\", "
+    "\"residual\": \"l2.out_0 += l1.out_0 (before relu); no other layer has equal widths\", "
+    "\"dense\": \"fluid and boundary rows each have their own layer-0 dense; l1.dense_0, "
+    "l2.dense_0 act on relu(features) of the same branch and are added\", "
+    "\"layers\": [{\"name\": \"l0\", \"out\": 3, \"concat\": [\"conv_fluid(1)\", "
+    "\"conv_obstacle(1)\", \"dense_fluid|dense_obstacle(1)\"]}, "
+    "{\"name\": \"l1\", \"inputs\": {\"0\": 3}, \"outputs\": {\"0\": 2, \"1\": 1}}, "
+    "{\"name\": \"l2\", \"inputs\": {\"0\": 2, \"1\": 1}, \"outputs\": {\"0\": 2}}, "
+    "{\"name\": \"sym0\", \"inputs\": {\"0\": 2}, \"outputs\": {\"0\": 3}}], "
+    "\"out_scale\": [0.0078125, 0.0078125, 0.0078125]}";
+
 unsigned char *model_builder_dmcf(const char *from, const char *to, size_t *size)
 {
-    static const char architecture[] =
-        "{\"network\": \"DMCF SymNet (HRNet trunk + antisymmetric output convolution), dim 3\", "
-        "\"timestep\": 0.02, \"gravity\": [0, -9.81, 0], "
-        "\"integration\": \"v2=v1+dt*g; p2=p1+dt*v2; p=p2+correction; v=(p-p1)/dt\", "
-        "\"features\": {\"fluid\": [\"1\", \"v2.x\", \"v2.y\", \"v2.z\"], "
-        "\"boundary\": [\"1\", \"n.x\", \"n.y\", \"n.z\"], \"use_vel\": true, \"use_acc\": false, "
-        "\"use_feats\": false, \"use_box_feats\": true, \"density_features\": false}, "
-        "\"use_boundary_in_all_layers\": true, "
-        "\"boundary_crop\": \"keep b iff min(p2)-0.8 <= b <= max(p2)+0.8 per axis\", "
-        "\"branches\": [{\"stride\": 1, \"radius\": 0.1, \"points\": \"fluid then kept "
-        "boundary\"}, {\"stride\": 2, \"radius\": 0.2, \"voxel\": 0.05}], "
-        "\"sampling\": {\"base_voxel\": 0.025, \"centralize\": true, \"hysteresis\": 0.1, "
-        "\"pad\": 0, \"source\": \"branch 0 points for every branch\"}, "
-        "\"cross_branch_radius\": \"radius of the coarser of the two branches\", "
-        "\"conv\": {\"kernel_size\": [2, 2, 2], \"window\": \"poly6: clip((1-q)^3,0,1), "
-        "q=d^2/r^2\", \"coordinate_mapping\": \"ball_to_cube_volume_preserving\", "
-        "\"interpolation\": \"trilinear, clamped\", \"align_corners\": true, "
-        "\"normalize\": false, \"ignore_query_point\": false, \"bias\": true}, "
-        "\"antisymmetric\": {\"kernel_size\": [2, 4, 2], "
-        "\"stored\": \"sym0.kernel_half [2,2,2,2,3]\", \"sym_axis\": 1, "
-        "\"full\": \"concat(axis=1: -half[::-1,::-1,::-1], half)\", "
-        "\"window\": \"peak: (1-sqrt(q))^2\", \"radius\": 0.1, \"ignore_query_point\": true, "
-        "\"bias\": false, "
-        "\"formula\": \"out_i = sum_k a_ik (f_i+f_k) g(x_k-x_i), f=relu(l2.out_0)\"}, "
-        "\"merge\": \"sum (add_merge)\", "
-        "\"activation\": \"relu on the input of every l1,l2 convolution/dense and of the "
-        "antisymmetric convolution; none on inputs of layer 0 and none on outputs\", "
-        "\"residual\": \"l2.out_0 += l1.out_0 (before relu); no other layer has equal widths\", "
-        "\"dense\": \"fluid and boundary rows each have their own layer-0 dense; l1.dense_0, "
-        "l2.dense_0 act on relu(features) of the same branch and are added\", "
-        "\"layers\": [{\"name\": \"l0\", \"out\": 3, \"concat\": [\"conv_fluid(1)\", "
-        "\"conv_obstacle(1)\", \"dense_fluid|dense_obstacle(1)\"]}, "
-        "{\"name\": \"l1\", \"inputs\": {\"0\": 3}, \"outputs\": {\"0\": 2, \"1\": 1}}, "
-        "{\"name\": \"l2\", \"inputs\": {\"0\": 2, \"1\": 1}, \"outputs\": {\"0\": 2}}, "
-        "{\"name\": \"sym0\", \"inputs\": {\"0\": 2}, \"outputs\": {\"0\": 3}}], "
-        "\"out_scale\": [0.0078125, 0.0078125, 0.0078125]}";
     static const struct {
         const char *name;
         int cells, in, out;
@@ -464,7 +476,7 @@ unsigned char *model_builder_dmcf(const char *from, const char *to, size_t *size
     add_random(&builder, &state, "sym0.kernel_half", 5, (const size_t[]){2, 2, 2, 2, 3}, 1.0);
     char floats[32];
     snprintf(floats, sizeof floats, "%zu", builder.data.length / 4);
-    add_published(&builder, architecture, floats, from, to);
+    add_published(&builder, dmcf_architecture, floats, from, to);
     add_replaced(&builder, "trained_with",
                  "gravity -9.81 along y, particle spacing 0.0625 m, boundary about 970 points per "
                  "m^2, dt 0.02 s",
@@ -472,23 +484,24 @@ unsigned char *model_builder_dmcf(const char *from, const char *to, size_t *size
     return model_builder_finish(&builder, size);
 }
 
+static const char cconv_architecture[] =
+    "{\"network\": \"CConv (Ummenhofer et al. ICLR 2020), dim 3\", \"timestep\": 0.02, "
+    "\"gravity\": [0, -9.81, 0], "
+    "\"integration\": \"v2=v1+dt*g; p2=p1+dt*(v1+v2)/2; p=p2+correction; v=(p-p1)/dt\", "
+    "\"features\": {\"fluid\": [\"1\", \"v2.x\", \"v2.y\", \"v2.z\"], "
+    "\"boundary\": [\"n.x\", \"n.y\", \"n.z\"]}, \"boundary_crop\": \"none\", "
+    "\"conv\": {\"kernel_size\": [2, 2, 2], \"radius\": 0.1125, \"extent\": 0.225, "
+    "\"window\": \"poly6: clip((1-q)^3,0,1), q=d^2/r^2\", "
+    "\"coordinate_mapping\": \"ball_to_cube_volume_preserving\", "
+    "\"interpolation\": \"trilinear, clamped\", \"align_corners\": true, "
+    "\"normalize\": false, \"ignore_query_point\": true, \"bias\": true}, "
+    "\"layers\": \"A0=concat(conv0_obstacle(1),conv0_fluid(1),dense0_fluid(1)) at fluid "
+    "points; for i=1..3: f=relu(A_{i-1}); A_i=conv_i(f)+dense_i(f) (+A_{i-1} if widths are "
+    "equal, i.e. only i=2); widths 3,2,2,3; correction=A_3/128\", "
+    "\"out_scale\": [0.0078125, 0.0078125, 0.0078125]}";
+
 unsigned char *model_builder_cconv(const char *from, const char *to, size_t *size)
 {
-    static const char architecture[] =
-        "{\"network\": \"CConv (Ummenhofer et al. ICLR 2020), dim 3\", \"timestep\": 0.02, "
-        "\"gravity\": [0, -9.81, 0], "
-        "\"integration\": \"v2=v1+dt*g; p2=p1+dt*(v1+v2)/2; p=p2+correction; v=(p-p1)/dt\", "
-        "\"features\": {\"fluid\": [\"1\", \"v2.x\", \"v2.y\", \"v2.z\"], "
-        "\"boundary\": [\"n.x\", \"n.y\", \"n.z\"]}, \"boundary_crop\": \"none\", "
-        "\"conv\": {\"kernel_size\": [2, 2, 2], \"radius\": 0.1125, \"extent\": 0.225, "
-        "\"window\": \"poly6: clip((1-q)^3,0,1), q=d^2/r^2\", "
-        "\"coordinate_mapping\": \"ball_to_cube_volume_preserving\", "
-        "\"interpolation\": \"trilinear, clamped\", \"align_corners\": true, "
-        "\"normalize\": false, \"ignore_query_point\": true, \"bias\": true}, "
-        "\"layers\": \"A0=concat(conv0_obstacle(1),conv0_fluid(1),dense0_fluid(1)) at fluid "
-        "points; for i=1..3: f=relu(A_{i-1}); A_i=conv_i(f)+dense_i(f) (+A_{i-1} if widths are "
-        "equal, i.e. only i=2); widths 3,2,2,3; correction=A_3/128\", "
-        "\"out_scale\": [0.0078125, 0.0078125, 0.0078125]}";
     static const struct {
         const char *name;
         int cells, in, out;
@@ -503,6 +516,30 @@ unsigned char *model_builder_cconv(const char *from, const char *to, size_t *siz
                     1.0);
     char floats[32];
     snprintf(floats, sizeof floats, "%zu", builder.data.length / 4);
-    add_published(&builder, architecture, floats, from, to);
+    add_published(&builder, cconv_architecture, floats, from, to);
     return model_builder_finish(&builder, size);
+}
+
+/* ---- Right tensors under another description ---------------------------------------------------- */
+
+static const model_random small = {
+    .levels = 2, .channels = 4, .cells = 2, .output_cells = 2, .neighbor_limit = 8};
+
+unsigned char *model_builder_described(char kind, const char *text, size_t *size)
+{
+    return kind == 'd'   ? model_builder_dmcf(dmcf_architecture, text, size)
+           : kind == 'c' ? model_builder_cconv(cconv_architecture, text, size)
+                         : random_file(&small, text, NULL, size);
+}
+
+char *model_builder_description(char kind)
+{
+    model_text text = {NULL, 0, 0};
+    size_t size;
+    if (kind != 'd' && kind != 'c') {
+        free(random_file(&small, NULL, &text.text, &size));
+        return text.text;
+    }
+    model_text_add(&text, "%s", kind == 'd' ? dmcf_architecture : cconv_architecture);
+    return text.text;
 }
