@@ -8,7 +8,7 @@
 #define WANTS_RECTIFIED 2
 
 /* Rows that are computed together: their columns share one pass over the weights. */
-#define TILE_ROWS 16
+#define TILE_ROWS 24
 /* Floats between the columns of a tile beyond their length, so that they do not collide in the cache. */
 #define COLUMN_PADDING 16
 
@@ -251,6 +251,8 @@ static ascc_status demand_rows(ascc_network_run *run, int32_t key, const uint8_t
     const ascc_status status = ascc_rows_make(rows, run->tools, active);
     if (status != ASCC_OK)
         return status;
+    if (!memchr(source, 0, rows->source->count))
+        return ASCC_OK; /* all are read already */
     mark_job job = {rows, active, source};
     ascc_workers_run(run->tools->workers, rows->query->count, 1024, mark_neighbors, &job);
     return ASCC_OK;

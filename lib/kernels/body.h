@@ -8,6 +8,13 @@
 #include "vector.h"
 
 #define RESTRICT restrict
+#if defined(__clang__)
+#define UNROLL _Pragma("clang loop unroll_count(4)")
+#elif defined(__GNUC__)
+#define UNROLL _Pragma("GCC unroll 4")
+#else
+#define UNROLL
+#endif
 
 /* A variant may bring a search of its own. */
 #ifndef SEARCH
@@ -191,19 +198,22 @@ static inline int corner_offsets(const int32_t cells[3], size_t offset[8])
     return cells[2] > 1 ? 8 : 4;
 }
 
-/* column[offset + j] += weight * f[j] for `vectors` vectors: the inner loop of gather. */
+/* Adds one neighbour's features to the cells around it: cells that are next to each other along x lie
+ * next to each other in the column, so there are 4 pairs of them, or 2 in a flat kernel. */
 #define SPREAD(name, vectors)                                                                      \
-    static inline void name(const float *RESTRICT f, const corners *at, size_t lane, size_t a,     \
-                            const size_t offset[8], int count, float *RESTRICT column)             \
+    static inline void name(const float *RESTRICT f, const float *RESTRICT weight, size_t x,       \
+                            size_t y, size_t z, int planes, float *RESTRICT cell)                  \
     {                                                                                              \
         vector v[vectors];                                                                         \
         for (size_t j = 0; j < vectors; j++)                                                       \
             v[j] = load(f + j * LANES);                                                            \
-        for (int c = 0; c < count; c++) {                                                          \
-            const vector weight = fill(at->weight[c][lane]);                                       \
-            float *RESTRICT cell = column + ((size_t)at->cell[lane] + offset[c]) * a;              \
-            for (size_t j = 0; j < vectors; j++)                                                   \
-                store(cell + j * LANES, fused(weight, v[j], load(cell + j * LANES)));              \
+        for (int plane = 0; plane < planes; plane++, cell += z, weight += 4 * LANES) {             \
+            float *RESTRICT at[4] = {cell, cell + x, cell + y, cell + y + x};                      \
+            for (size_t c = 0; c < 4; c++) {                                                       \
+                const vector w = fill(weight[c * LANES]);                                          \
+                for (size_t j = 0; j < vectors; j++)                                               \
+                    store(at[c] + j * LANES, fused(w, v[j], load(at[c] + j * LANES)));             \
+            }                                                                                      \
         }                                                                                          \
     }
 SPREAD(spread_1, 1)
@@ -214,8 +224,9 @@ SPREAD(spread_4, 4)
 static void gather(const ascc_pairs *pairs, const float *window, const uint32_t *neighbor, size_t k,
                    const float *feature, size_t a, const int32_t cells[3], float *column)
 {
-    size_t offset[8];
-    const int count = corner_offsets(cells, offset);
+    const size_t x = cells[0] > 1 ? a : 0, y = cells[1] > 1 ? (size_t)cells[0] * a : 0;
+    const size_t z = cells[2] > 1 ? (size_t)cells[0] * (size_t)cells[1] * a : 0;
+    const int planes = cells[2] > 1 ? 2 : 1;
     memset(column, 0, (size_t)cells[0] * (size_t)cells[1] * (size_t)cells[2] * a * sizeof *column);
     for (size_t i = 0; i < k; i += LANES) {
         const size_t n = k - i < LANES ? k - i : LANES;
@@ -223,16 +234,17 @@ static void gather(const ascc_pairs *pairs, const float *window, const uint32_t 
         find_corners(pairs->x + i, pairs->y + i, pairs->z + i, window ? window + i : NULL, n, cells,
                      &at);
         for (size_t l = 0; l < n; l++) {
-            const float *f = feature + (size_t)neighbor[i + l] * a;
+            const float *f = feature + (size_t)neighbor[i + l] * a, *w = at.weight[0] + l;
+            float *cell = column + (size_t)at.cell[l] * a;
             size_t j = 0;
             for (; j + 4 * LANES <= a; j += 4 * LANES)
-                spread_4(f + j, &at, l, a, offset, count, column + j);
+                spread_4(f + j, w, x, y, z, planes, cell + j);
             if (j + 3 * LANES <= a)
-                spread_3(f + j, &at, l, a, offset, count, column + j);
+                spread_3(f + j, w, x, y, z, planes, cell + j);
             else if (j + 2 * LANES <= a)
-                spread_2(f + j, &at, l, a, offset, count, column + j);
+                spread_2(f + j, w, x, y, z, planes, cell + j);
             else if (j < a)
-                spread_1(f + j, &at, l, a, offset, count, column + j);
+                spread_1(f + j, w, x, y, z, planes, cell + j);
         }
     }
 }
@@ -247,7 +259,8 @@ static void gather(const ascc_pairs *pairs, const float *window, const uint32_t 
         for (size_t r = 0; r < rows; r++)                                                          \
             for (size_t c = 0; c < vectors; c++)                                                   \
                 sum[r][c] = load(out + r * out_stride + c * LANES);                                \
-        for (size_t i = 0; i < a; i++) {                                                           \
+        UNROLL for (size_t i = 0; i < a; i++)                                                      \
+        {                                                                                          \
             vector w[vectors];                                                                     \
             for (size_t c = 0; c < vectors; c++)                                                   \
                 w[c] = load(weight + i * b + c * LANES);                                           \
@@ -268,10 +281,17 @@ TILE(tile_8_1, 8, 1)
 TILE(tile_4_1, 4, 1)
 TILE(tile_1_1, 1, 1)
 
-static void multiply(const float *in, size_t in_stride, size_t n, size_t a, const float *weight,
-                     size_t b, float *out, size_t out_stride)
+/* Inputs that are multiplied in one go, so that their weights and columns stay in the first cache. */
+#define DEPTH 128
+
+/* The sums of a stretch of inputs go on where those before it ended. */
+static void multiply_stretch(const float *in, size_t in_stride, size_t n, size_t a,
+                             const float *weight, size_t b, float *out, size_t out_stride)
 {
     size_t c = 0;
+#ifdef MULTIPLY_FIRST /* a variant may take the first columns with tiles of its own */
+    c = MULTIPLY_FIRST(in, in_stride, n, a, weight, b, out, out_stride);
+#endif
 #define ROWS(tile, rows)                                                                           \
     for (; r + rows <= n; r += rows)                                                               \
         tile(in + r * in_stride, in_stride, a, weight + c, b, out + r * out_stride + c, out_stride);
@@ -288,6 +308,15 @@ static void multiply(const float *in, size_t in_stride, size_t n, size_t a, cons
         ROWS(tile_1_1, 1)
     }
 #undef ROWS
+}
+
+static void multiply(const float *in, size_t in_stride, size_t n, size_t a, const float *weight,
+                     size_t b, float *out, size_t out_stride)
+{
+    for (size_t i = 0; i < a; i += DEPTH) {
+        const size_t depth = a - i < DEPTH ? a - i : DEPTH;
+        multiply_stretch(in + i, in_stride, n, depth, weight + i * b, b, out, out_stride);
+    }
 }
 
 static void pair_terms(const ascc_pairs *pairs, const float *window, const uint32_t *neighbor,

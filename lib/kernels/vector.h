@@ -1,7 +1,9 @@
 /* Eight floats as one value, for each instruction set: what body.h is written in.
  * SPDX-License-Identifier: MIT
  *
- * Every operation is elementwise and correctly rounded, so the bits are those of eight scalars.
+ * Every operation is elementwise and correctly rounded, so the bits are those of eight scalars. The
+ * file of a variant picks its branch, whatever the compiler's flags allow, with ASCC_USE_AVX2 (AVX2 and
+ * FMA) or ASCC_USE_NEON; without either it is plain C.
  */
 #ifndef ASCC_VECTOR_H
 #define ASCC_VECTOR_H
@@ -12,7 +14,7 @@
 
 #define LANES 8
 
-#if defined(__AVX2__) && defined(__FMA__)
+#if defined(ASCC_USE_AVX2)
 #include <immintrin.h>
 
 typedef __m256 vector;
@@ -48,7 +50,7 @@ static inline vector fused(vector a, vector b, vector c)
     return _mm256_fmadd_ps(a, b, c);
 }
 
-#elif defined(__aarch64__)
+#elif defined(ASCC_USE_NEON)
 #include <arm_neon.h>
 
 typedef struct vector {
@@ -87,6 +89,7 @@ static inline vector fused(vector a, vector b, vector c)
 }
 
 #else
+#include "fused.h"
 
 typedef struct vector {
     float lane[LANES];
@@ -128,8 +131,11 @@ static inline vector times(vector a, vector b)
 
 static inline vector fused(vector a, vector b, vector c)
 {
+#if defined(__GNUC__) && !defined(__clang__)
+#pragma GCC unroll 1
+#endif
     for (int i = 0; i < LANES; i++)
-        c.lane[i] = fmaf(a.lane[i], b.lane[i], c.lane[i]);
+        c.lane[i] = fused_once(a.lane[i], b.lane[i], c.lane[i]);
     return c;
 }
 
