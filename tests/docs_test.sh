@@ -23,5 +23,12 @@ for page in README.md docs/getting-started.md; do
         failed=1
     fi
 done
+number=$((number + 1))
+if sh docs/make_api.sh | cmp -s - docs/api.md; then
+    echo "ok $number - docs/api.md is what the header says"
+else
+    echo "not ok $number - docs/api.md is what the header says: sh docs/make_api.sh >docs/api.md"
+    failed=1
+fi
 echo "1..$number"
 exit $failed
