@@ -143,6 +143,16 @@ if [ "$(uname -m)" = x86_64 ]; then
         done
     done
 
+    # Plain C with all the flags of this machine: contraction stays off, and fmaf is the instruction.
+    name=x86_64-gcc-native
+    if ! command -v gcc >/dev/null 2>&1; then
+        skip "state hashes: $name" "no gcc"
+    elif build_core $name gcc 3 -Dc_args=-march=native; then
+        hashes $name gcc 3 env
+    else
+        not_ok "$name builds" "$build/$name.log"
+    fi
+
     # AVX-512 where there is none: the code of avx512.c over emulated intrinsics. Its objects come
     # before the archive and so replace those in it.
     name=x86_64-gcc-O3
@@ -151,26 +161,26 @@ if [ "$(uname -m)" = x86_64 ]; then
     elif ! grep -q '^flags.* avx2' /proc/cpuinfo || [ ! -f $build/$name/lib/libascc-core.a ]; then
         skip "AVX-512 emulated" "no AVX2, or no gcc"
     else
-        at=$build/avx512-emulated
+        wide=$build/avx512-emulated
         flags="-O2 -std=c11 -ffp-contract=off -fno-math-errno -fno-trapping-math -Iinclude -c"
         # shellcheck disable=SC2086
         gcc $flags -include tests/support/avx512_emulated.h -mavx2 -mfma -mpopcnt \
-            lib/kernels/avx512.c -o "$at.o" >"$at.log" 2>&1 &&
+            lib/kernels/avx512.c -o "$wide.o" >"$wide.log" 2>&1 &&
             gcc $flags -DASCC_HAVE_AVX2 -DASCC_HAVE_AVX512 '-D__builtin_cpu_supports(x)=1' \
-                lib/kernels/select.c -o "$at-select.o" >>"$at.log" 2>&1 &&
-            link_program $name gcc 2 state_hash_512 "$at-select.o" "$at.o" $state_hash &&
+                lib/kernels/select.c -o "$wide-select.o" >>"$wide.log" 2>&1 &&
+            link_program $name gcc 2 state_hash_512 "$wide-select.o" "$wide.o" $state_hash &&
             link_program $name gcc 2 test_kernels_512 -Itests/support/bare tests/test_kernels.c \
-                "$at-select.o" "$at.o" &&
-            "$build/$name/state_hash_512" >"$at.hashes" 2>>"$at.log"
+                "$wide-select.o" "$wide.o" &&
+            "$build/$name/state_hash_512" >"$wide.hashes" 2>>"$wide.log"
         if [ $? -eq 0 ]; then
-            compare "AVX-512 emulated" "$at.hashes"
-            if "$build/$name/test_kernels_512" >"$at.kernels.log" 2>&1; then
+            compare "AVX-512 emulated" "$wide.hashes"
+            if "$build/$name/test_kernels_512" >"$wide.kernels.log" 2>&1; then
                 ok "test_kernels: AVX-512 emulated"
             else
-                not_ok "test_kernels: AVX-512 emulated" "$at.kernels.log"
+                not_ok "test_kernels: AVX-512 emulated" "$wide.kernels.log"
             fi
         else
-            not_ok "AVX-512 emulated" "$at.log"
+            not_ok "AVX-512 emulated" "$wide.log"
         fi
     fi
 else
