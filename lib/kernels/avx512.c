@@ -1,6 +1,10 @@
 /* The kernels for AVX-512 F, BW, DQ and VL: the common text in registers of eight floats, of which there
  * are 32 now; products sixteen columns wide; a search that compacts sixteen candidates at once.
- * SPDX-License-Identifier: MIT */
+ * SPDX-License-Identifier: MIT
+ *
+ * Never yet run on a CPU that has AVX-512, so no speed is known either. It compiles with gcc 12 and
+ * clang 14, and tests/cross_test.sh runs this text over intrinsics emulated lane by lane. Where a
+ * machine has AVX-512, every test runs it. */
 #include <immintrin.h>
 #include <stddef.h>
 #include <stdint.h>
