@@ -74,16 +74,25 @@ static void impulse_of(const pair_job *job, size_t i, uint32_t j, const float te
         impulse[c] = t[c] * mass;
 }
 
+/* What the last layer reads. */
+static const float *output_values(const ascc_network_run *run)
+{
+    const ascc_output *output = &run->network->plan->output;
+    const ascc_value *value = &run->value[output->source];
+    return output->rectify ? value->rectified : value->raw;
+}
+
 static void flush(pair_job *job, size_t i, batch *b)
 {
     const ascc_network_run *run = job->run;
     const ascc_plan *plan = run->network->plan;
-    const size_t d = (size_t)plan->dimension, a = (size_t)run->network->output_inputs;
+    const size_t d = (size_t)plan->dimension, a = ascc_padded(plan->output.inputs);
+    const float *value = output_values(run);
     const ascc_pairs pairs = {b->x, b->y, b->z, {0}};
     run->tools->kernels->pair_terms(
         &pairs, plan->output.filter.window == ASCC_WINDOW_NONE ? NULL : b->window, b->neighbor,
-        b->count, run->output + i * a, run->output, a, plan->output.filter.cells,
-        run->network->output_weight, d, b->term[0]);
+        b->count, value + i * a, value, a, plan->output.filter.cells,
+        run->network->term_weight[plan->term_count], d, b->term[0]);
     for (size_t k = 0; k < b->count; k++) {
         const size_t j = b->neighbor[k];
         double impulse[3];
@@ -227,8 +236,8 @@ ascc_status ascc_antisymmetric_impulses(const ascc_network_run *run,
                          &job);
     const uint64_t bad = atomic_load(&job.bad_row);
     if (bad)
-        return bad_value(run, run->output, (size_t)network->output_inputs, (size_t)bad - 1,
-                         host_row(h, set, (size_t)bad - 1));
+        return bad_value(run, output_values(run), ascc_padded(network->plan->output.inputs),
+                         (size_t)bad - 1, host_row(h, set, (size_t)bad - 1));
     for (size_t i = 0; i < count; i++) {
         const size_t row = host_row(h, set, i);
         int64_t *to =
@@ -247,16 +256,16 @@ ascc_status ascc_plain_impulses(const ascc_network_run *run, const ascc_impulse_
     const int32_t source = network->plan->output.source;
     const int32_t set = ascc_network_set(network, source);
     const size_t d = (size_t)network->plan->dimension;
-    const float *value =
-        network->plan->output.rectify ? run->value[source].rectified : run->value[source].raw;
+    const float *value = output_values(run);
+    const size_t a = ascc_padded(network->plan->output.inputs);
     for (size_t i = 0; i < h->fluid_count; i++) {
         const size_t from = set == ASCC_SET_FLUID ? i : h->whole[ASCC_SET_FLUID][i];
         const size_t row = host_row(h, set, from);
         for (size_t c = 0; c < d; c++) {
             const double impulse =
-                (double)value[from * d + c] * scale->factor[c] * scale->mass[row];
+                (double)value[from * a + c] * scale->factor[c] * scale->mass[row];
             if (!(fabs(impulse) < ASCC_IMPULSE_LIMIT))
-                return bad_value(run, value, d, from, row);
+                return bad_value(run, value, a, from, row);
             impulses->fluid[row * d + c] = (int64_t)((impulse + ROUND_MAGIC) - ROUND_MAGIC);
         }
     }

@@ -61,18 +61,54 @@ static int32_t find_key(ascc_network *network, int32_t query, int32_t source,
     return k;
 }
 
-/* [cell][input][output] to [cell][output][padded input]: what the pair kernel reads in a row. */
-static void arrange_output(const ascc_network *network, size_t cells)
+static size_t arranged_size(const ascc_plan *plan, int32_t t)
 {
-    const ascc_output *output = &network->plan->output;
-    const size_t a = (size_t)output->inputs, b = (size_t)network->plan->dimension;
-    const size_t padded = (size_t)network->output_inputs;
-    memset(network->output_weight, 0, network->output_weight_count * sizeof(float));
+    if (t == plan->term_count)
+        return plan->output.kind != ASCC_OUTPUT_ANTISYMMETRIC
+                   ? 0
+                   : cell_count(&plan->output.filter) * (size_t)plan->dimension *
+                         ascc_padded(plan->output.inputs);
+    const ascc_term *term = &plan->term[t];
+    if (term->kind == ASCC_TERM_IDENTITY)
+        return 0;
+    const size_t cells = term->kind == ASCC_TERM_CONVOLUTION ? cell_count(&term->filter) : 1;
+    return cells * ascc_padded(term->inputs) * ascc_padded(term->outputs);
+}
+
+/* Fills up the channels of one term's weights with zeros; the output's are turned over as well. */
+static void arrange(const ascc_plan *plan, int32_t t, float *to)
+{
+    const bool last = t == plan->term_count;
+    const ascc_term *term = last ? NULL : &plan->term[t];
+    const float *from = last ? plan->output.weight : term->weight;
+    const size_t a = (size_t)(last ? plan->output.inputs : term->inputs);
+    const size_t b = (size_t)(last ? plan->dimension : term->outputs);
+    const size_t a8 = ascc_padded((int32_t)a), b8 = last ? b : ascc_padded((int32_t)b);
+    const size_t cells = arranged_size(plan, t) / (a8 * b8);
+    memset(to, 0, cells * a8 * b8 * sizeof *to);
     for (size_t c = 0; c < cells; c++)
         for (size_t i = 0; i < a; i++)
             for (size_t o = 0; o < b; o++)
-                network->output_weight[(c * b + o) * padded + i] =
-                    output->weight[(c * a + i) * b + o];
+                to[last ? (c * b + o) * a8 + i : (c * a8 + i) * b8 + o] = from[(c * a + i) * b + o];
+}
+
+static bool arrange_all(ascc_network *network)
+{
+    const ascc_plan *plan = network->plan;
+    for (int32_t t = 0; t <= plan->term_count; t++)
+        network->weight_count += arranged_size(plan, t);
+    network->weights = ascc_allocate(network->allocator, network->weight_count, sizeof(float));
+    if (!network->weights)
+        return false;
+    float *to = network->weights;
+    for (int32_t t = 0; t <= plan->term_count; t++) {
+        const size_t size = arranged_size(plan, t);
+        network->term_weight[t] = to;
+        if (size)
+            arrange(plan, t, to);
+        to += size;
+    }
+    return true;
 }
 
 ascc_status ascc_network_create(ascc_network *network, const ascc_allocator *allocator,
@@ -89,15 +125,9 @@ ascc_status ascc_network_create(ascc_network *network, const ascc_allocator *all
     network->key = ascc_allocate(allocator, terms, sizeof *network->key);
     network->term_key = ascc_allocate(allocator, terms, sizeof *network->term_key);
     network->wants = ascc_allocate(allocator, (size_t)network->value_count, 1);
-    if (antisymmetric) {
-        network->output_inputs = (output->inputs + 7) / 8 * 8;
-        network->output_weight_count =
-            cell_count(&output->filter) * (size_t)network->output_inputs * (size_t)plan->dimension;
-        network->output_weight =
-            ascc_allocate(allocator, network->output_weight_count, sizeof(float));
-    }
-    if (!network->key || !network->term_key || !network->wants ||
-        (antisymmetric && !network->output_weight)) {
+    network->term_weight = ascc_allocate(allocator, terms, sizeof *network->term_weight);
+    if (!network->key || !network->term_key || !network->wants || !network->term_weight ||
+        !arrange_all(network)) {
         ascc_network_destroy(network);
         return ascc_fail(message, ASCC_ERROR_MEMORY, "no memory to prepare the network");
     }
@@ -118,7 +148,6 @@ ascc_status ascc_network_create(ascc_network *network, const ascc_allocator *all
     if (antisymmetric) {
         const int32_t set = ascc_network_set(network, output->source);
         network->term_key[plan->term_count] = find_key(network, set, set, &output->filter, false);
-        arrange_output(network, cell_count(&output->filter));
     }
     return ASCC_OK;
 }
@@ -132,7 +161,8 @@ void ascc_network_destroy(ascc_network *network)
     ascc_release(a, network->key, terms, sizeof *network->key);
     ascc_release(a, network->term_key, terms, sizeof *network->term_key);
     ascc_release(a, network->wants, (size_t)network->value_count, 1);
-    ascc_release(a, network->output_weight, network->output_weight_count, sizeof(float));
+    ascc_release(a, network->weights, network->weight_count, sizeof(float));
+    ascc_release(a, (void *)network->term_weight, terms, sizeof *network->term_weight);
     memset(network, 0, sizeof *network);
 }
 
@@ -308,8 +338,7 @@ typedef struct layer_job {
     const ascc_network_run *run;
     const ascc_layer *layer;
     ascc_value *value;
-    float *output; /* the last layer's padded copy, or NULL */
-    size_t output_stride;
+    size_t width;         /* of a tile's row: what any term may write */
     const uint32_t *list; /* active rows */
     float *scratch;       /* [slots][scratch_size]: columns, then a tile of the layer */
     size_t scratch_size, tile_offset;
@@ -331,7 +360,7 @@ static void convolve_tile(const layer_job *job, const ascc_term *term, const asc
                           const uint32_t *list, size_t n, float *column, float *tile)
 {
     const ascc_kernels *kernels = job->run->tools->kernels;
-    const size_t a = (size_t)term->inputs, width = (size_t)job->layer->channels;
+    const size_t a = ascc_padded(term->inputs), width = job->width;
     const size_t length = cell_count(&term->filter) * a, stride = length + COLUMN_PADDING;
     const float *feature = source_values(job->run, term);
     for (size_t r = 0; r < n; r++) {
@@ -343,8 +372,9 @@ static void convolve_tile(const layer_job *job, const ascc_term *term, const asc
                         rows->count[list[r]], feature, a, term->filter.cells, column + r * stride);
         add_bias(term, tile + r * width + term->column);
     }
-    kernels->multiply(column, stride, n, length, term->weight, (size_t)term->outputs,
-                      tile + term->column, width);
+    kernels->multiply(column, stride, n, length,
+                      job->run->network->term_weight[term - job->run->network->plan->term],
+                      ascc_padded(term->outputs), tile + term->column, width);
 }
 
 /* Dense and residual terms: rows that the source's set shares with the layer's. */
@@ -353,7 +383,7 @@ static void pointwise_tile(const layer_job *job, const ascc_term *term, const ui
 {
     const ascc_network_run *run = job->run;
     const int32_t set = ascc_network_set(run->network, term->source);
-    const size_t a = (size_t)term->inputs, width = (size_t)job->layer->channels;
+    const size_t a = ascc_padded(term->inputs), width = job->width;
     const float *source = source_values(run, term);
     for (size_t r = 0, j; r < n; r++) {
         if (!shared_row(run->hierarchy, job->layer->set, set, list[r], &j))
@@ -361,29 +391,29 @@ static void pointwise_tile(const layer_job *job, const ascc_term *term, const ui
         float *row = tile + r * width + term->column;
         const float *from = source + j * a;
         if (term->kind == ASCC_TERM_IDENTITY) {
-            for (size_t c = 0; c < a; c++)
+            for (int32_t c = 0; c < term->inputs; c++)
                 row[c] += from[c];
             continue;
         }
         add_bias(term, row);
-        run->tools->kernels->multiply(from, a, 1, a, term->weight, (size_t)term->outputs, row,
-                                      width);
+        run->tools->kernels->multiply(from, a, 1, a,
+                                      run->network->term_weight[term - run->network->plan->term],
+                                      ascc_padded(term->outputs), row, width);
     }
 }
 
-static void store_tile(const layer_job *job, const uint32_t *list, size_t n, const float *tile)
+/* Stores one row of a value as its readers want it, filled up with zeros. */
+static void store_row(const ascc_value *value, size_t row, const float *from, int32_t channels)
 {
-    const size_t width = (size_t)job->layer->channels;
-    const bool rectify = job->run->network->plan->output.rectify;
-    for (size_t r = 0; r < n; r++) {
-        const float *from = tile + r * width;
-        for (size_t c = 0; job->value->raw && c < width; c++)
-            job->value->raw[list[r] * width + c] = from[c];
-        for (size_t c = 0; job->value->rectified && c < width; c++)
-            job->value->rectified[list[r] * width + c] = from[c] < 0.0f ? 0.0f : from[c];
-        float *padded = job->output ? job->output + list[r] * job->output_stride : NULL;
-        for (size_t c = 0; padded && c < job->output_stride; c++)
-            padded[c] = c >= width || (rectify && from[c] < 0.0f) ? 0.0f : from[c];
+    const size_t padded = ascc_padded(channels);
+    float *raw = value->raw ? value->raw + row * padded : NULL;
+    float *rectified = value->rectified ? value->rectified + row * padded : NULL;
+    for (size_t c = 0; c < padded; c++) {
+        const float x = c < (size_t)channels ? from[c] : 0.0f;
+        if (raw)
+            raw[c] = x;
+        if (rectified)
+            rectified[c] = x < 0.0f ? 0.0f : x;
     }
 }
 
@@ -396,7 +426,7 @@ static void compute_tiles(void *data, size_t begin, size_t end, int32_t slot)
     for (size_t at = begin; at < end; at += TILE_ROWS) {
         const size_t n = ascc_min_size(TILE_ROWS, end - at);
         const uint32_t *list = job->list + at;
-        memset(tile, 0, n * (size_t)job->layer->channels * sizeof *tile);
+        memset(tile, 0, n * job->width * sizeof *tile);
         for (int32_t t = job->layer->first_term;
              t < job->layer->first_term + job->layer->term_count; t++) {
             const ascc_term *term = &plan->term[t];
@@ -406,7 +436,8 @@ static void compute_tiles(void *data, size_t begin, size_t end, int32_t slot)
             else
                 pointwise_tile(job, term, list, n, tile);
         }
-        store_tile(job, list, n, tile);
+        for (size_t r = 0; r < n; r++)
+            store_row(job->value, list[r], tile + r * job->width, job->layer->channels);
     }
 }
 
@@ -414,7 +445,7 @@ static void compute_tiles(void *data, size_t begin, size_t end, int32_t slot)
 static bool take_value(ascc_network_run *run, int32_t v)
 {
     const size_t rows = run->hierarchy->set[ascc_network_set(run->network, v)].count;
-    const size_t channels = (size_t)ascc_network_channels(run->network, v);
+    const size_t channels = ascc_padded(ascc_network_channels(run->network, v));
     ascc_value *value = &run->value[v];
     if (run->network->wants[v] & WANTS_RAW) {
         value->raw = ascc_arena_take(run->tools->arena, rows, channels * sizeof(float));
@@ -426,35 +457,17 @@ static bool take_value(ascc_network_run *run, int32_t v)
         if (!value->rectified)
             return false;
     }
-    const bool last = v == run->network->plan->output.source && run->network->output_inputs > 0;
-    if (!last)
-        return true;
-    run->output = ascc_arena_take(run->tools->arena, rows,
-                                  (size_t)run->network->output_inputs * sizeof(float));
-    return run->output != NULL;
+    return true;
 }
 
 /* Features come in the host's order; values are in the order of the set. */
 static void place_features(ascc_network_run *run, int32_t v, const float *features)
 {
     const ascc_hierarchy *h = run->hierarchy;
-    const size_t channels = (size_t)ascc_network_channels(run->network, v);
-    const ascc_output *output = &run->network->plan->output;
-    const ascc_value *value = &run->value[v];
+    const int32_t channels = ascc_network_channels(run->network, v);
     for (size_t i = 0; i < h->set[v].count; i++) {
         const size_t row = h->origin[h->whole[v][i]] - (v == 0 ? 0 : h->fluid_count);
-        const float *from = features + row * channels;
-        for (size_t c = 0; c < channels; c++) {
-            const float rectified = from[c] < 0.0f ? 0.0f : from[c];
-            if (value->raw)
-                value->raw[i * channels + c] = from[c];
-            if (value->rectified)
-                value->rectified[i * channels + c] = rectified;
-        }
-        const size_t stride = (size_t)run->network->output_inputs;
-        for (size_t c = 0; v == output->source && c < stride; c++)
-            run->output[i * stride + c] =
-                c >= channels || (output->rectify && from[c] < 0.0f) ? 0.0f : from[c];
+        store_row(&run->value[v], i, features + row * (size_t)channels, channels);
     }
 }
 
@@ -466,20 +479,17 @@ static ascc_status compute_layer(ascc_network_run *run, int32_t l, uint32_t *lis
     size_t longest = 0;
     for (int32_t t = layer->first_term; t < layer->first_term + layer->term_count; t++)
         if (plan->term[t].kind == ASCC_TERM_CONVOLUTION)
-            longest = ascc_max_size(
-                longest,
-                cell_count(&plan->term[t].filter) * (size_t)plan->term[t].inputs + COLUMN_PADDING);
+            longest = ascc_max_size(longest, cell_count(&plan->term[t].filter) *
+                                                     ascc_padded(plan->term[t].inputs) +
+                                                 COLUMN_PADDING);
     layer_job job = {.run = run, .layer = layer, .value = &run->value[l + 2], .list = list};
     const size_t slots = (size_t)ascc_workers_count(tools->workers);
+    job.width = ascc_padded(layer->channels) + 8;
     job.tile_offset = TILE_ROWS * longest;
-    job.scratch_size = job.tile_offset + TILE_ROWS * (size_t)layer->channels + COLUMN_PADDING;
+    job.scratch_size = job.tile_offset + TILE_ROWS * job.width;
     job.scratch = ascc_arena_take(tools->arena, slots * job.scratch_size, sizeof(float));
     if (!job.scratch || !take_value(run, l + 2))
         return ascc_fail(tools->message, ASCC_ERROR_MEMORY, "no memory for layer %s", layer->name);
-    if (plan->output.source == l + 2) {
-        job.output = run->output;
-        job.output_stride = (size_t)run->network->output_inputs;
-    }
     size_t count = 0;
     const size_t rows = run->hierarchy->set[layer->set].count;
     for (size_t i = 0; i < rows; i++)

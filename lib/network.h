@@ -24,12 +24,14 @@ typedef struct ascc_network {
     const ascc_plan *plan;
     int32_t value_count;
     int32_t key_count;
-    ascc_rows_key *key;   /* [term_count + 1] */
-    int32_t *term_key;    /* [term_count + 1], last: the output; -1 = none */
-    uint8_t *wants;       /* [value_count] WANTS_* */
-    float *output_weight; /* antisymmetric: [cell][dimension][padded inputs] */
-    size_t output_weight_count;
-    int32_t output_inputs; /* padded to a multiple of 8 */
+    ascc_rows_key *key; /* [term_count + 1] */
+    int32_t *term_key;  /* [term_count + 1], last: the output; -1 = none */
+    uint8_t *wants;     /* [value_count] WANTS_* */
+    /* Weights as the kernels read them, channels filled up to multiples of 8: convolutions
+     * [cell][inputs][outputs], dense [inputs][outputs], an antisymmetric output [cell][dimension][inputs] */
+    float *weights;
+    size_t weight_count;
+    const float **term_weight; /* [term_count + 1] */
     int32_t max_neighbors;
 } ascc_network;
 
@@ -41,10 +43,16 @@ void ascc_network_destroy(ascc_network *network);
 int32_t ascc_network_set(const ascc_network *network, int32_t value);
 int32_t ascc_network_channels(const ascc_network *network, int32_t value);
 
+/* Channels as they are stored: a multiple of 8, the rest zeros. */
+static inline size_t ascc_padded(int32_t channels)
+{
+    return ((size_t)channels + 7) / 8 * 8;
+}
+
 /* One value in one step; rows that nobody reads hold garbage. */
 typedef struct ascc_value {
     uint8_t *active;  /* [rows] */
-    float *raw;       /* [rows][channels], NULL if only the rectified are read */
+    float *raw;       /* [rows][padded channels], NULL if only the rectified are read */
     float *rectified; /* or NULL */
 } ascc_value;
 
@@ -54,7 +62,6 @@ typedef struct ascc_network_run {
     const ascc_search_tools *tools;
     ascc_value *value;
     ascc_rows *rows; /* [key_count] */
-    float *output;   /* [rows][output_inputs] source of the last layer as it reads it */
     size_t neighbor_count;
     uint32_t longest;
 } ascc_network_run;

@@ -5,6 +5,7 @@
 #include <time.h>
 
 #include "antisymmetric.h"
+#include "arrays.h"
 #include "integrate.h"
 
 #define DEFAULT_MAX_NEIGHBORS 4096
@@ -292,22 +293,6 @@ static ascc_status run_once(ascc_step *step, ascc_particles *p, const ascc_motio
 
 /* ---- The call ---- */
 
-static double component(const ascc_const_array *array, size_t row, size_t c, size_t d)
-{
-    const ptrdiff_t scalar = array->scalar == ASCC_DOUBLE ? 8 : 4;
-    const ptrdiff_t across = array->component_stride ? array->component_stride : scalar;
-    const ptrdiff_t down = array->stride ? array->stride : scalar * (ptrdiff_t)d;
-    const char *at = (const char *)array->data + (ptrdiff_t)row * down + (ptrdiff_t)c * across;
-    if (array->scalar == ASCC_DOUBLE) {
-        double value;
-        memcpy(&value, at, sizeof value);
-        return value;
-    }
-    float value;
-    memcpy(&value, at, sizeof value);
-    return (double)value;
-}
-
 /* Reads what acts from outside; the acceleration is copied once. */
 static ascc_status read_forces(ascc_step *step, const ascc_particles *p, const ascc_forces *forces,
                                ascc_motion *motion)
@@ -330,7 +315,7 @@ static ascc_status read_forces(ascc_step *step, const ascc_particles *p, const a
         return ascc_fail(&step->message, ASCC_ERROR_MEMORY, "no memory for the acceleration");
     for (size_t i = 0; i < p->fluid_count; i++)
         for (size_t c = 0; c < d; c++) {
-            const double a = component(f.acceleration, i, c, d);
+            const double a = ascc_array_read(f.acceleration, i, c, d);
             if (!isfinite(a))
                 return ascc_fail(&step->message, ASCC_ERROR_NOT_FINITE,
                                  "acceleration: row %zu component %zu is not finite", i, c);

@@ -4,16 +4,14 @@
  * All variants give the same bits because they are this text: only correctly rounded operations, fma
  * exactly where fmaf stands, every sum in the order written here, and no libm transcendental.
  */
-#include <math.h>
-#include <string.h>
-
 #include "kernels.h"
+#include "vector.h"
 
 #define RESTRICT restrict
 
-/* Largest kernel cell position handled in one go by pair_terms: a * b floats. */
-#define PAIR_CAPACITY 3072
-
+/* A variant may bring a search of its own. */
+#ifndef SEARCH
+#define SEARCH search
 static size_t search(const ascc_coordinates *points, size_t begin, size_t end, int32_t x, int32_t y,
                      int32_t z, float limit, uint32_t *RESTRICT found)
 {
@@ -28,6 +26,7 @@ static size_t search(const ascc_coordinates *points, size_t begin, size_t end, i
     }
     return count;
 }
+#endif
 
 /* (4 / pi) atan(v) for |v| <= 1; odd, within 6e-8 of the truth, monotone enough for a cell lookup. */
 static inline float octant(float v)
@@ -125,163 +124,209 @@ static void geometry(const ascc_coordinates *points, const uint32_t *RESTRICT ne
         map_radial(px, py, pz, k);
 }
 
-/* The cells around one kernel position and their weights: 8 of them, or 4 in a flat kernel. */
+/* Where eight neighbours lie among the cells: the lowest of the cells around each, and the weights of
+ * all of them, window included. */
 typedef struct corners {
-    size_t cell[8];
-    float weight[8];
-    int count;
+    int32_t cell[LANES];
+    float weight[8][LANES];
 } corners;
 
-/* Lower cell, upper cell and fraction along an axis of `size` cells (align corners). */
-static inline void axis_cells(float p, int32_t size, int32_t *low, int32_t *high, float *fraction)
+/* Lower cell and fraction along an axis of `size` cells (align corners). At the upper end the last
+ * cell has the fraction 1. */
+static inline void axis_cells(float p, int32_t size, int32_t *low, float *fraction)
 {
     const float c = (p * 0.5f + 0.5f) * (float)(size - 1);
+    const int32_t last = size > 1 ? size - 2 : 0;
     int32_t i = (int32_t)c;
-    i = i < 0 ? 0 : i > size - 1 ? size - 1 : i;
+    i = i > 0 ? i : 0;
+    i = i < last ? i : last;
+    float t = c - (float)i;
+    t = t > 0.0f ? t : 0.0f;
+    t = t < 1.0f ? t : 1.0f;
     *low = i;
-    *high = i + 1 < size ? i + 1 : i;
-    const float t = c - (float)i;
-    *fraction = t < 0.0f ? 0.0f : t > 1.0f ? 1.0f : t;
+    *fraction = t;
 }
 
-static inline void find_corners(float x, float y, float z, const int32_t cells[3], corners *out)
+/* Corners of neighbours [0, n), n <= 8; the rest of the lanes repeats lane 0. */
+static inline void find_corners(const float *RESTRICT x, const float *RESTRICT y,
+                                const float *RESTRICT z, const float *RESTRICT window, size_t n,
+                                const int32_t cells[3], corners *RESTRICT out)
 {
-    int32_t x0, x1, y0, y1, z0, z1;
-    float tx, ty, tz;
-    axis_cells(x, cells[0], &x0, &x1, &tx);
-    axis_cells(y, cells[1], &y0, &y1, &ty);
-    const size_t w = (size_t)cells[0], wh = w * (size_t)cells[1];
-    const size_t y0w = (size_t)y0 * w, y1w = (size_t)y1 * w;
-    const float sx = 1.0f - tx, sy = 1.0f - ty;
-    const size_t plane[4] = {y0w + (size_t)x0, y0w + (size_t)x1, y1w + (size_t)x0,
-                             y1w + (size_t)x1};
-    const float flat[4] = {sx * sy, tx * sy, sx * ty, tx * ty};
-    if (cells[2] == 1) {
-        for (int i = 0; i < 4; i++) {
-            out->cell[i] = plane[i];
-            out->weight[i] = flat[i];
-        }
-        out->count = 4;
-        return;
+    float px[LANES], py[LANES], pz[LANES], scale[LANES];
+    for (size_t i = 0; i < LANES; i++) {
+        const size_t k = i < n ? i : 0;
+        px[i] = x[k];
+        py[i] = y[k];
+        pz[i] = z[k];
+        scale[i] = window ? window[k] : 1.0f;
     }
-    axis_cells(z, cells[2], &z0, &z1, &tz);
-    const float sz = 1.0f - tz;
-    for (int i = 0; i < 4; i++) {
-        out->cell[i] = (size_t)z0 * wh + plane[i];
-        out->cell[4 + i] = (size_t)z1 * wh + plane[i];
-        out->weight[i] = flat[i] * sz;
-        out->weight[4 + i] = flat[i] * tz;
+    const int32_t w = cells[0], wh = w * cells[1];
+    for (size_t i = 0; i < LANES; i++) {
+        int32_t ix, iy, iz;
+        float tx, ty, tz;
+        axis_cells(px[i], cells[0], &ix, &tx);
+        axis_cells(py[i], cells[1], &iy, &ty);
+        axis_cells(pz[i], cells[2], &iz, &tz);
+        const float sx = 1.0f - tx, sy = 1.0f - ty;
+        const float z0 = (1.0f - tz) * scale[i], z1 = tz * scale[i];
+        out->cell[i] = iz * wh + iy * w + ix;
+        out->weight[0][i] = sx * sy * z0;
+        out->weight[1][i] = tx * sy * z0;
+        out->weight[2][i] = sx * ty * z0;
+        out->weight[3][i] = tx * ty * z0;
+        out->weight[4][i] = sx * sy * z1;
+        out->weight[5][i] = tx * sy * z1;
+        out->weight[6][i] = sx * ty * z1;
+        out->weight[7][i] = tx * ty * z1;
     }
-    out->count = 8;
 }
+
+/* Distances of the corners from the lowest in cells, and how many there are: 4 in a flat kernel. */
+static inline int corner_offsets(const int32_t cells[3], size_t offset[8])
+{
+    const size_t x = cells[0] > 1, y = cells[1] > 1 ? (size_t)cells[0] : 0;
+    const size_t z = cells[2] > 1 ? (size_t)cells[0] * (size_t)cells[1] : 0;
+    for (size_t i = 0; i < 8; i++)
+        offset[i] = (i & 1) * x + (i >> 1 & 1) * y + (i >> 2) * z;
+    return cells[2] > 1 ? 8 : 4;
+}
+
+/* column[offset + j] += weight * f[j] for `vectors` vectors: the inner loop of gather. */
+#define SPREAD(name, vectors)                                                                      \
+    static inline void name(const float *RESTRICT f, const corners *at, size_t lane, size_t a,     \
+                            const size_t offset[8], int count, float *RESTRICT column)             \
+    {                                                                                              \
+        vector v[vectors];                                                                         \
+        for (size_t j = 0; j < vectors; j++)                                                       \
+            v[j] = load(f + j * LANES);                                                            \
+        for (int c = 0; c < count; c++) {                                                          \
+            const vector weight = fill(at->weight[c][lane]);                                       \
+            float *RESTRICT cell = column + ((size_t)at->cell[lane] + offset[c]) * a;              \
+            for (size_t j = 0; j < vectors; j++)                                                   \
+                store(cell + j * LANES, fused(weight, v[j], load(cell + j * LANES)));              \
+        }                                                                                          \
+    }
+SPREAD(spread_1, 1)
+SPREAD(spread_2, 2)
+SPREAD(spread_3, 3)
+SPREAD(spread_4, 4)
 
 static void gather(const ascc_pairs *pairs, const float *window, const uint32_t *neighbor, size_t k,
                    const float *feature, size_t a, const int32_t cells[3], float *column)
 {
-    const size_t cell_count = (size_t)cells[0] * (size_t)cells[1] * (size_t)cells[2];
-    memset(column, 0, cell_count * a * sizeof *column);
-    for (size_t i = 0; i < k; i++) {
+    size_t offset[8];
+    const int count = corner_offsets(cells, offset);
+    memset(column, 0, (size_t)cells[0] * (size_t)cells[1] * (size_t)cells[2] * a * sizeof *column);
+    for (size_t i = 0; i < k; i += LANES) {
+        const size_t n = k - i < LANES ? k - i : LANES;
         corners at;
-        find_corners(pairs->x[i], pairs->y[i], pairs->z[i], cells, &at);
-        const float *RESTRICT f = feature + (size_t)neighbor[i] * a;
-        const float scale = window ? window[i] : 1.0f;
-        for (int c = 0; c < at.count; c++) {
-            const float weight = at.weight[c] * scale;
-            float *RESTRICT cell = column + at.cell[c] * a;
-            for (size_t j = 0; j < a; j++)
-                cell[j] = fmaf(weight, f[j], cell[j]);
+        find_corners(pairs->x + i, pairs->y + i, pairs->z + i, window ? window + i : NULL, n, cells,
+                     &at);
+        for (size_t l = 0; l < n; l++) {
+            const float *f = feature + (size_t)neighbor[i + l] * a;
+            size_t j = 0;
+            for (; j + 4 * LANES <= a; j += 4 * LANES)
+                spread_4(f + j, &at, l, a, offset, count, column + j);
+            if (j + 3 * LANES <= a)
+                spread_3(f + j, &at, l, a, offset, count, column + j);
+            else if (j + 2 * LANES <= a)
+                spread_2(f + j, &at, l, a, offset, count, column + j);
+            else if (j < a)
+                spread_1(f + j, &at, l, a, offset, count, column + j);
         }
     }
 }
 
-/* out[rows][columns] += in * weight for a tile held in registers. */
-#define TILE_COLUMNS 16
-#define TILE(rows, columns)                                                                        \
-    static void tile_##rows##_##columns(const float *RESTRICT in, size_t in_stride, size_t a,      \
-                                        const float *RESTRICT weight, size_t b,                    \
-                                        float *RESTRICT out, size_t out_stride)                    \
+/* out[rows][vectors * 8] += in * weight with all sums in registers. */
+#define TILE(name, rows, vectors)                                                                  \
+    static void name(const float *RESTRICT in, size_t in_stride, size_t a,                         \
+                     const float *RESTRICT weight, size_t b, float *RESTRICT out,                  \
+                     size_t out_stride)                                                            \
     {                                                                                              \
-        float sum[rows][columns];                                                                  \
+        vector sum[rows][vectors];                                                                 \
         for (size_t r = 0; r < rows; r++)                                                          \
-            for (size_t c = 0; c < columns; c++)                                                   \
-                sum[r][c] = out[r * out_stride + c];                                               \
-        for (size_t i = 0; i < a; i++)                                                             \
+            for (size_t c = 0; c < vectors; c++)                                                   \
+                sum[r][c] = load(out + r * out_stride + c * LANES);                                \
+        for (size_t i = 0; i < a; i++) {                                                           \
+            vector w[vectors];                                                                     \
+            for (size_t c = 0; c < vectors; c++)                                                   \
+                w[c] = load(weight + i * b + c * LANES);                                           \
             for (size_t r = 0; r < rows; r++) {                                                    \
-                const float value = in[r * in_stride + i];                                         \
-                for (size_t c = 0; c < columns; c++)                                               \
-                    sum[r][c] = fmaf(value, weight[i * b + c], sum[r][c]);                         \
+                const vector value = fill(in[r * in_stride + i]);                                  \
+                for (size_t c = 0; c < vectors; c++)                                               \
+                    sum[r][c] = fused(value, w[c], sum[r][c]);                                     \
             }                                                                                      \
+        }                                                                                          \
         for (size_t r = 0; r < rows; r++)                                                          \
-            for (size_t c = 0; c < columns; c++)                                                   \
-                out[r * out_stride + c] = sum[r][c];                                               \
+            for (size_t c = 0; c < vectors; c++)                                                   \
+                store(out + r * out_stride + c * LANES, sum[r][c]);                                \
     }
-TILE(4, 16)
-TILE(1, 16)
-TILE(4, 8)
-TILE(1, 8)
-TILE(4, 4)
-TILE(1, 4)
-TILE(1, 1)
+TILE(tile_6_2, 6, 2)
+TILE(tile_4_2, 4, 2)
+TILE(tile_1_2, 1, 2)
+TILE(tile_8_1, 8, 1)
+TILE(tile_4_1, 4, 1)
+TILE(tile_1_1, 1, 1)
 
 static void multiply(const float *in, size_t in_stride, size_t n, size_t a, const float *weight,
                      size_t b, float *out, size_t out_stride)
 {
     size_t c = 0;
-#define COLUMNS(width)                                                                             \
-    for (; c + width <= b; c += width) {                                                           \
-        size_t r = 0;                                                                              \
-        for (; r + 4 <= n; r += 4)                                                                 \
-            tile_4_##width(in + r * in_stride, in_stride, a, weight + c, b,                        \
-                           out + r * out_stride + c, out_stride);                                  \
-        for (; r < n; r++)                                                                         \
-            tile_1_##width(in + r * in_stride, in_stride, a, weight + c, b,                        \
-                           out + r * out_stride + c, out_stride);                                  \
+#define ROWS(tile, rows)                                                                           \
+    for (; r + rows <= n; r += rows)                                                               \
+        tile(in + r * in_stride, in_stride, a, weight + c, b, out + r * out_stride + c, out_stride);
+    for (; c + 2 * LANES <= b; c += 2 * LANES) {
+        size_t r = 0;
+        ROWS(tile_6_2, 6)
+        ROWS(tile_4_2, 4)
+        ROWS(tile_1_2, 1)
     }
-    COLUMNS(16)
-    COLUMNS(8)
-    COLUMNS(4)
-#undef COLUMNS
-    for (; c < b; c++)
-        for (size_t r = 0; r < n; r++)
-            tile_1_1(in + r * in_stride, in_stride, a, weight + c, b, out + r * out_stride + c,
-                     out_stride);
+    if (c < b) {
+        size_t r = 0;
+        ROWS(tile_8_1, 8)
+        ROWS(tile_4_1, 4)
+        ROWS(tile_1_1, 1)
+    }
+#undef ROWS
 }
 
 static void pair_terms(const ascc_pairs *pairs, const float *window, const uint32_t *neighbor,
-                       size_t k, const float *RESTRICT center, const float *feature, size_t a,
-                       const int32_t cells[3], const float *weight, size_t b, float *RESTRICT out)
+                       size_t k, const float *center, const float *feature, size_t a,
+                       const int32_t cells[3], const float *weight, size_t b, float *out)
 {
-    float kernel[PAIR_CAPACITY];
-    const size_t ab = a * b;
-    for (size_t i = 0; i < k; i++) {
+    size_t offset[8];
+    const int count = corner_offsets(cells, offset);
+    for (int c = 0; c < count; c++)
+        offset[c] *= a * b;
+    for (size_t i = 0; i < k; i += LANES) {
+        const size_t n = k - i < LANES ? k - i : LANES;
         corners at;
-        find_corners(pairs->x[i], pairs->y[i], pairs->z[i], cells, &at);
-        const float *RESTRICT w0 = weight + at.cell[0] * ab;
-        for (size_t j = 0; j < ab; j++)
-            kernel[j] = at.weight[0] * w0[j];
-        for (int c = 1; c < at.count; c++) {
-            const float *RESTRICT w = weight + at.cell[c] * ab;
-            for (size_t j = 0; j < ab; j++)
-                kernel[j] = fmaf(at.weight[c], w[j], kernel[j]);
-        }
-        const float *RESTRICT f = feature + (size_t)neighbor[i] * a;
-        const float scale = window ? window[i] : 1.0f;
-        for (size_t o = 0; o < b; o++) {
-            float lane[8] = {0};
-            const float *RESTRICT g = kernel + o * a;
-            for (size_t j = 0; j < a; j += 8)
-                for (size_t l = 0; l < 8; l++)
-                    lane[l] = fmaf(center[j + l] + f[j + l], g[j + l], lane[l]);
-            const float sum = ((lane[0] + lane[4]) + (lane[2] + lane[6])) +
-                              ((lane[1] + lane[5]) + (lane[3] + lane[7]));
-            out[i * 4 + o] = scale * sum;
+        find_corners(pairs->x + i, pairs->y + i, pairs->z + i, window ? window + i : NULL, n, cells,
+                     &at);
+        for (size_t l = 0; l < n; l++) {
+            const float *f = feature + (size_t)neighbor[i + l] * a;
+            const float *base = weight + (size_t)at.cell[l] * a * b;
+            vector share[8];
+            for (int c = 0; c < count; c++)
+                share[c] = fill(at.weight[c][l]);
+            for (size_t o = 0; o < b; o++) {
+                vector sum = fill(0.0f);
+                for (size_t j = 0; j < a; j += LANES) {
+                    const float *w = base + o * a + j;
+                    vector g = times(share[0], load(w));
+                    for (int c = 1; c < count; c++)
+                        g = fused(share[c], load(w + offset[c]), g);
+                    sum = fused(add(load(center + j), load(f + j)), g, sum);
+                }
+                out[(i + l) * 4 + o] = total(sum);
+            }
         }
     }
 }
 
 void ASCC_VARIANT(ascc_kernels *kernels)
 {
-    kernels->search = search;
+    kernels->search = SEARCH;
     kernels->geometry = geometry;
     kernels->gather = gather;
     kernels->multiply = multiply;

@@ -2,7 +2,8 @@
  * cannot fail. portable.c defines what is right; every variant gives the same bits.
  * SPDX-License-Identifier: MIT
  *
- * Shape letters: n rows, k neighbours, a input channels, b output channels, c kernel cells.
+ * Shape letters: n rows, k neighbours, a input channels, b output channels, c kernel cells. Channels
+ * come in multiples of 8, filled up with zeros where a network has fewer.
  */
 #ifndef ASCC_KERNELS_H
 #define ASCC_KERNELS_H
@@ -41,14 +42,13 @@ typedef struct ascc_kernels {
     void (*gather)(const ascc_pairs *pairs, const float *window, const uint32_t *neighbor, size_t k,
                    const float *feature, size_t a, const int32_t cells[3], float *column);
 
-    /* out[n][out_stride] += in[n][a] * weight[a][b]: each output one chain of fma over ascending a.
-     */
+    /* out[n][out_stride] += in[n][a] * weight[a][b]: each output one chain of fma over ascending a. */
     void (*multiply)(const float *in, size_t in_stride, size_t n, size_t a, const float *weight,
                      size_t b, float *out, size_t out_stride);
 
     /* out[j][b] = window * sum over a of (center[a] + feature[neighbor[j]][a]) * kernel(j)[b][a],
      * kernel(j) = sum over c of trilinear weight * weight[c][b][a], for each pair j < k on its own.
-     * a is a multiple of 8, 8 partial sums by a mod 8; b <= 3, out is [k][4]; a * b <= 3072. */
+     * 8 partial sums by a mod 8; b <= 3 is not filled up here, out is [k][4]. */
     void (*pair_terms)(const ascc_pairs *pairs, const float *window, const uint32_t *neighbor,
                        size_t k, const float *center, const float *feature, size_t a,
                        const int32_t cells[3], const float *weight, size_t b, float *out);

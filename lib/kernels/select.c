@@ -8,7 +8,8 @@ uint32_t ascc_kernels_available(void)
     uint32_t cpu = 0;
 #if defined(ASCC_HAVE_AVX2)
     __builtin_cpu_init();
-    if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma"))
+    if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma") &&
+        __builtin_cpu_supports("bmi2"))
         cpu |= ASCC_CPU_AVX2;
 #endif
     return cpu;

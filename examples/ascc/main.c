@@ -1,0 +1,41 @@
+/* The ascc program: picks the subcommand. SPDX-License-Identifier: MIT */
+#include <stdio.h>
+#include <string.h>
+
+#include <ascc/ascc.h>
+
+#include "commands.h"
+
+static const struct {
+    const char *name, *text;
+    int (*run)(int argc, char **argv);
+} commands[] = {
+    {"sim", "run a model on a scene", ascc_command_sim},
+    {"info", "describe a model or sequence file", ascc_command_info},
+};
+
+static void usage(FILE *out)
+{
+    fprintf(out, "usage: ascc COMMAND ...\n\n");
+    for (size_t i = 0; i < sizeof commands / sizeof *commands; i++)
+        fprintf(out, "  %-10s %s\n", commands[i].name, commands[i].text);
+    fprintf(out, "  %-10s print the version\n\nascc COMMAND --help tells more.\n", "version");
+}
+
+int main(int argc, char **argv)
+{
+    const char *name = argc > 1 ? argv[1] : "";
+    for (size_t i = 0; i < sizeof commands / sizeof *commands; i++)
+        if (strcmp(name, commands[i].name) == 0)
+            return commands[i].run(argc - 2, argv + 2);
+    if (strcmp(name, "version") == 0 || strcmp(name, "--version") == 0) {
+        const int32_t v = ascc_version();
+        printf("ascc %d.%d.%d\n", v / 10000, v / 100 % 100, v % 100);
+        return 0;
+    }
+    const int help = strcmp(name, "help") == 0 || strcmp(name, "--help") == 0;
+    if (!help && argc > 1)
+        fprintf(stderr, "ascc: '%s' is no command\n", name);
+    usage(help ? stdout : stderr);
+    return help ? 0 : 2;
+}

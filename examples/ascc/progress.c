@@ -1,0 +1,56 @@
+/* Draws the bar a few times a second. SPDX-License-Identifier: MIT */
+#include "progress.h"
+
+#include <stdio.h>
+#include <time.h>
+#include <unistd.h>
+
+#define WIDTH 30
+
+static double now(void)
+{
+    struct timespec t;
+    clock_gettime(CLOCK_MONOTONIC, &t);
+    return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
+}
+
+static void draw(const ascc_progress *p, double time)
+{
+    const double share = p->total ? (double)p->done / (double)p->total : 1.0;
+    const double spent = time - p->started;
+    const double left = share > 0.0 ? spent * (1.0 - share) / share : 0.0;
+    char bar[WIDTH + 1];
+    for (int i = 0; i < WIDTH; i++)
+        bar[i] = i < (int)(share * WIDTH) ? '#' : '.';
+    bar[WIDTH] = '\0';
+    fprintf(stderr, "\r%s [%s] %zu/%zu  %.1f/s  %d:%02d left \033[K", p->label, bar, p->done,
+            p->total, spent > 0.0 ? (double)p->done / spent : 0.0, (int)left / 60, (int)left % 60);
+    fflush(stderr);
+}
+
+void ascc_progress_start(ascc_progress *p, const char *label, size_t total)
+{
+    p->label = label;
+    p->done = 0;
+    p->total = total;
+    p->started = p->drawn = now();
+    p->visible = isatty(STDERR_FILENO) != 0;
+    if (p->visible)
+        draw(p, p->started);
+}
+
+void ascc_progress_add(ascc_progress *p, size_t count)
+{
+    p->done += count;
+    const double time = p->visible ? now() : 0.0;
+    if (!p->visible || time - p->drawn < 0.1)
+        return;
+    p->drawn = time;
+    draw(p, time);
+}
+
+void ascc_progress_end(ascc_progress *p)
+{
+    if (p->visible)
+        fprintf(stderr, "\r\033[K");
+}

@@ -1,0 +1,21 @@
+/* A progress bar on stderr, silent when that is no terminal. SPDX-License-Identifier: MIT */
+#ifndef ASCC_PROGRESS_H
+#define ASCC_PROGRESS_H
+
+#include <stdbool.h>
+#include <stddef.h>
+
+typedef struct ascc_progress {
+    const char *label;
+    size_t done, total;
+    double started, drawn; /* s */
+    bool visible;
+} ascc_progress;
+
+/* The label is kept, not copied. */
+void ascc_progress_start(ascc_progress *progress, const char *label, size_t total);
+void ascc_progress_add(ascc_progress *progress, size_t count);
+/* Clears the line. */
+void ascc_progress_end(ascc_progress *progress);
+
+#endif

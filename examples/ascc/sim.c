@@ -1,0 +1,473 @@
+/* ascc sim: runs a model on a scene and writes what happens. SPDX-License-Identifier: MIT */
+#include <errno.h>
+#include <inttypes.h>
+#include <math.h>
+#include <signal.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+
+#include "commands.h"
+#include "host.h"
+#include "picture.h"
+#include "ply.h"
+#include "progress.h"
+#include "scenes.h"
+
+typedef struct options {
+    const char *model, *scene, *out, *frames, *ply;
+    int32_t steps, every, threads, size;
+    double time_step, spacing;
+    bool has_gravity, difference;
+    double gravity[3];
+} options;
+
+static void usage(FILE *to)
+{
+    fprintf(to, "usage: ascc sim MODEL SCENE -n STEPS [-o OUT] [options]\n\n"
+                "MODEL  a model file, or demo (a demonstration model, not trained)\n"
+                "SCENE  a sequence file, whose first frame starts the run, or one of\n");
+    for (const ascc_scene_name *s = ascc_scene_names; s->name; s++)
+        fprintf(to, "         %s-2d, %s-3d: %s\n", s->name, s->name, s->text);
+    fprintf(to, "\n"
+                "  -n STEPS           time steps\n"
+                "  -o OUT             a sequence file of all frames\n"
+                "  --frames DIR       one PNG picture a frame\n"
+                "  --ply DIR          one binary PLY file a frame\n"
+                "  --every K          a frame every K steps (1)\n"
+                "  --threads N        threads to use (1)\n"
+                "  --dt S             time step, seconds (the model's)\n"
+                "  --gravity X,Y[,Z]  m/s^2 (the scene's)\n"
+                "  --size N           particles along a named scene's longest edge\n"
+                "  --spacing S        particle spacing of a named scene, metres (0.05)\n"
+                "  --velocity KIND    of a sequence: stored (default), or difference of its first\n"
+                "                     two frames, starting from the second\n");
+}
+
+static bool bad_use(const char *what, const char *value)
+{
+    fprintf(stderr, "ascc sim: %s%s%s; ascc sim --help tells more\n", what, value ? ": " : "",
+            value ? value : "");
+    return false;
+}
+
+/* ---- Arguments ---- */
+
+static bool whole(const char *name, const char *text, long low, long high, int32_t *value)
+{
+    char *end;
+    errno = 0;
+    const long n = strtol(text, &end, 10);
+    if (errno || *end || end == text || n < low || n > high) {
+        fprintf(stderr, "ascc sim: %s %s: a whole number from %ld to %ld is wanted\n", name, text,
+                low, high);
+        return false;
+    }
+    *value = (int32_t)n;
+    return true;
+}
+
+static bool real(const char *name, const char *text, double *value)
+{
+    char *end;
+    *value = strtod(text, &end);
+    if (*end || end == text || !isfinite(*value) || *value <= 0.0) {
+        fprintf(stderr, "ascc sim: %s %s: a positive number is wanted\n", name, text);
+        return false;
+    }
+    return true;
+}
+
+static bool vector(const char *name, const char *text, double value[3])
+{
+    const char *at = text;
+    for (int c = 0; c < 3; c++) {
+        char *end;
+        value[c] = strtod(at, &end);
+        if (end == at || !isfinite(value[c]))
+            break;
+        if (*end == '\0' && c > 0)
+            return true;
+        if (*end != ',')
+            break;
+        at = end + 1;
+    }
+    fprintf(stderr, "ascc sim: %s %s: two or three numbers with commas are wanted\n", name, text);
+    return false;
+}
+
+static bool read_option(options *o, const char *name, const char *value)
+{
+    if (strcmp(name, "-n") == 0)
+        return whole(name, value, 1, 100000000, &o->steps);
+    if (strcmp(name, "-o") == 0)
+        return (o->out = value) != NULL;
+    if (strcmp(name, "--frames") == 0)
+        return (o->frames = value) != NULL;
+    if (strcmp(name, "--ply") == 0)
+        return (o->ply = value) != NULL;
+    if (strcmp(name, "--every") == 0)
+        return whole(name, value, 1, 100000000, &o->every);
+    if (strcmp(name, "--threads") == 0)
+        return whole(name, value, 1, 1024, &o->threads);
+    if (strcmp(name, "--size") == 0)
+        return whole(name, value, 4, 1000, &o->size);
+    if (strcmp(name, "--dt") == 0)
+        return real(name, value, &o->time_step);
+    if (strcmp(name, "--spacing") == 0)
+        return real(name, value, &o->spacing);
+    if (strcmp(name, "--gravity") == 0)
+        return o->has_gravity = vector(name, value, o->gravity);
+    if (strcmp(name, "--velocity") == 0 && strcmp(value, "stored") == 0)
+        return true;
+    if (strcmp(name, "--velocity") == 0 && strcmp(value, "difference") == 0)
+        return o->difference = true;
+    if (strcmp(name, "--velocity") == 0)
+        return bad_use("--velocity takes stored or difference", value);
+    return bad_use("unknown option", name);
+}
+
+static bool read_arguments(options *o, int argc, char **argv)
+{
+    for (int i = 0; i < argc; i++) {
+        if (argv[i][0] == '-') {
+            if (i + 1 >= argc)
+                return bad_use("a value is missing behind", argv[i]);
+            if (!read_option(o, argv[i], argv[i + 1]))
+                return false;
+            i++;
+        } else if (!o->model) {
+            o->model = argv[i];
+        } else if (!o->scene) {
+            o->scene = argv[i];
+        } else {
+            return bad_use("one argument too many", argv[i]);
+        }
+    }
+    if (!o->model || !o->scene)
+        return bad_use("MODEL and SCENE are wanted", NULL);
+    return o->steps > 0 || bad_use("-n STEPS is wanted", NULL);
+}
+
+/* ---- The scene ---- */
+
+/* A name that ends in -2d or -3d and is no file: a built-in scene. */
+static bool load_scene(const options *o, ascc_sequence *scene, char *error, size_t capacity)
+{
+    const size_t length = strlen(o->scene);
+    FILE *file = fopen(o->scene, "rb");
+    if (file)
+        (void)fclose(file);
+    if (!file && length > 3 &&
+        (strcmp(o->scene + length - 3, "-2d") == 0 || strcmp(o->scene + length - 3, "-3d") == 0)) {
+        char name[64];
+        (void)snprintf(name, sizeof name, "%.*s", (int)(length - 3 < 60 ? length - 3 : 60),
+                       o->scene);
+        return ascc_scene_make(name, o->scene[length - 2] - '0', o->size, o->spacing, scene, error,
+                               capacity);
+    }
+    return ascc_sequence_read(o->scene, scene, error, capacity);
+}
+
+/* Positions and velocities that start the run; from differences: frame 1, (frame 1 - frame 0) / dt. */
+static bool start_of(const options *o, ascc_sequence *s, const float **position, char *error,
+                     size_t capacity)
+{
+    const size_t n = s->count * (size_t)s->dimension;
+    *position = s->position;
+    if (!o->difference)
+        return true;
+    if (s->frames < 2) {
+        (void)snprintf(error, capacity, "%s: --velocity difference takes two frames", o->scene);
+        return false;
+    }
+    for (size_t k = 0; k < n; k++)
+        s->velocity[k] =
+            (float)(((double)s->position[n + k] - (double)s->position[k]) / s->time_step);
+    *position = s->position + n;
+    return true;
+}
+
+/* ---- The run ---- */
+
+static volatile sig_atomic_t interrupted;
+
+static void on_interrupt(int number)
+{
+    (void)number;
+    interrupted = 1;
+}
+
+typedef struct simulation {
+    const options *o;
+    ascc_sequence scene;
+    ascc_view view;
+    ascc_context *context;
+    ascc_model *model;
+    ascc_particles *particles;
+    ascc_step *step;
+    ascc_sequence_writer *writer;
+    float *position, *velocity;
+    uint64_t *id;
+    double time_step;
+    /* Sums over the run. */
+    int32_t steps;
+    double seconds[7];
+    int64_t drift[3]; /* quanta: what is left of before + external - wall - after */
+    ascc_measures first, last;
+    double max_density;
+    char error[768];
+} simulation;
+
+static bool make_directory(simulation *s, const char *path)
+{
+    if (!path || mkdir(path, 0777) == 0 || errno == EEXIST)
+        return true;
+    (void)snprintf(s->error, sizeof s->error, "%s: %s", path, strerror(errno));
+    return false;
+}
+
+static bool read_state(simulation *s)
+{
+    const ascc_array x = {.data = s->position}, v = {.data = s->velocity};
+    return ascc_particles_get(s->particles, ASCC_FLUID, ASCC_POSITION, 0, s->scene.count, &x) ==
+               ASCC_OK &&
+           ascc_particles_get(s->particles, ASCC_FLUID, ASCC_VELOCITY, 0, s->scene.count, &v) ==
+               ASCC_OK;
+}
+
+static bool write_frame(simulation *s)
+{
+    char path[600], text[96];
+    const size_t room = sizeof s->error;
+    if (!read_state(s))
+        return false;
+    if (s->writer && !ascc_sequence_append(s->writer, s->position, s->velocity, s->error, room))
+        return false;
+    if (s->o->frames) {
+        (void)snprintf(path, sizeof path, "%s/frame_%05d.png", s->o->frames, s->steps);
+        (void)snprintf(text, sizeof text, "t = %.3f s   step %d   %zu particles",
+                       s->steps * s->time_step, s->steps, s->scene.count);
+        if (!ascc_picture_write(path, &s->view, s->position, s->velocity, s->scene.count, text,
+                                s->error, room))
+            return false;
+    }
+    if (s->o->ply) {
+        (void)snprintf(path, sizeof path, "%s/frame_%05d.ply", s->o->ply, s->steps);
+        if (!ascc_ply_write(path, s->scene.dimension, s->position, s->velocity, s->id,
+                            s->scene.count, s->error, room))
+            return false;
+    }
+    return true;
+}
+
+static bool measure(simulation *s, ascc_measures *m)
+{
+    m->size = sizeof *m;
+    if (ascc_particles_measure(s->particles, m) != ASCC_OK) {
+        (void)snprintf(s->error, sizeof s->error, "%s", ascc_particles_message(s->particles));
+        return false;
+    }
+    s->max_density = fmax(s->max_density, m->max_density);
+    return true;
+}
+
+static void count_step(simulation *s)
+{
+    ascc_step_statistics t = {.size = sizeof t};
+    (void)ascc_step_get_statistics(s->step, &t);
+    const double seconds[7] = {t.seconds_prepare, t.seconds_hierarchy,  t.seconds_search,
+                               t.seconds_network, t.seconds_last_layer, t.seconds_commit,
+                               t.seconds_total};
+    for (int i = 0; i < 7; i++)
+        s->seconds[i] += seconds[i];
+    for (int c = 0; c < 3; c++)
+        s->drift[c] +=
+            t.momentum_before[c] + t.external_impulse[c] - t.wall_impulse[c] - t.momentum_after[c];
+}
+
+static bool advance(simulation *s)
+{
+    const ascc_forces forces = {.size = sizeof forces,
+                                .gravity = s->o->has_gravity ? s->o->gravity : s->scene.gravity};
+    ascc_progress progress;
+    ascc_progress_start(&progress, "stepping", (size_t)s->o->steps);
+    bool good = write_frame(s);
+    while (good && s->steps < s->o->steps && !interrupted) {
+        if (ascc_step_run(s->step, s->particles, &forces, 1) != ASCC_OK) {
+            (void)snprintf(s->error, sizeof s->error, "step %d: %s", s->steps + 1,
+                           ascc_step_message(s->step));
+            good = false;
+            break;
+        }
+        s->steps++;
+        count_step(s);
+        if (s->steps % s->o->every == 0)
+            good = write_frame(s) && measure(s, &s->last);
+        ascc_progress_add(&progress, 1);
+    }
+    ascc_progress_end(&progress);
+    return measure(s, &s->last) && good;
+}
+
+/* ---- The table at the end ---- */
+
+static double potential(const simulation *s, const ascc_measures *m)
+{
+    const double *g = s->o->has_gravity ? s->o->gravity : s->scene.gravity;
+    double energy = 0.0;
+    for (int c = 0; c < s->scene.dimension; c++)
+        energy -= m->mass * g[c] * m->center[c];
+    return energy;
+}
+
+static bool weightless(const simulation *s)
+{
+    const double *g = s->o->has_gravity ? s->o->gravity : s->scene.gravity;
+    return s->scene.walls == 0 && g[0] == 0.0 && g[1] == 0.0 &&
+           (s->scene.dimension == 2 || g[2] == 0.0);
+}
+
+static void print_momentum(const simulation *s)
+{
+    ascc_model_info info = {.size = sizeof info};
+    (void)ascc_model_get_info(s->model, &info);
+    const double q = ascc_particles_momentum_quantum(s->particles);
+    double drift = 0.0, start = 0.0;
+    for (int c = 0; c < 3; c++) {
+        drift += (double)s->drift[c] * q * (double)s->drift[c] * q;
+        start += s->first.momentum[c] * s->first.momentum[c];
+    }
+    printf("momentum error      %.3g  (%" PRId64 " %" PRId64 " %" PRId64
+           " quanta of %.3g kg m/s%s)\n",
+           sqrt(drift) / (sqrt(start) + 1e-10), s->drift[0], s->drift[1], s->drift[2], q,
+           info.conserves_momentum ? "" : "; this model does not conserve it");
+    if (!weightless(s))
+        return;
+    double turn = 0.0;
+    for (int c = 0; c < 3; c++)
+        turn += pow(s->last.angular_momentum[c] - s->first.angular_momentum[c], 2.0);
+    printf("angular mom. error  %.3g  of sum m |x| |v|%s\n",
+           sqrt(turn) / (s->first.angular_scale + 1e-10),
+           info.conserves_angular_momentum ? "" : "; this model does not conserve it");
+}
+
+static void print_table(const simulation *s)
+{
+    static const char *const phases[7] = {"prepare",    "hierarchy", "search", "network",
+                                          "last layer", "commit",    "total"};
+    const double n = s->steps ? s->steps : 1;
+    printf("particles           %zu fluid, %zu boundary\n", s->scene.count, s->scene.walls);
+    printf("steps               %d of %g s, %d threads\n", s->steps, s->time_step, s->o->threads);
+    for (int i = 0; i < 7; i++)
+        printf("  %-17s %9.3f ms a step\n", phases[i], 1e3 * s->seconds[i] / n);
+    if (s->scene.count)
+        printf("  %-17s %9.3f us a step\n", "per particle",
+               1e6 * s->seconds[6] / n / (double)s->scene.count);
+    print_momentum(s);
+    printf("max. density error  %.1f %%  of rest density, over all frames\n",
+           100.0 * fmax(0.0, s->max_density - 1.0));
+    printf("energy              kinetic %.4g to %.4g J, potential %.4g to %.4g J\n",
+           s->first.kinetic_energy, s->last.kinetic_energy, potential(s, &s->first),
+           potential(s, &s->last));
+}
+
+/* ---- From arguments to table ---- */
+
+static bool open_handles(simulation *s)
+{
+    const options *o = s->o;
+    const ascc_context_options context = {.size = sizeof context, .thread_count = o->threads};
+    ascc_status status = ascc_context_create(&context, &s->context);
+    if (status == ASCC_OK)
+        status = ascc_host_model(s->context, o->model, s->scene.dimension, 2.0 * s->scene.radius,
+                                 &s->model);
+    if (status != ASCC_OK) {
+        ascc_host_complain(s->context, o->model, status);
+        return false;
+    }
+    const float *position;
+    if (!start_of(o, &s->scene, &position, s->error, sizeof s->error))
+        return false;
+    if (ascc_host_particles(s->context, &s->scene, position, s->scene.velocity, &s->particles) !=
+        ASCC_OK)
+        return false;
+    const ascc_step_options step = {.size = sizeof step, .time_step = o->time_step};
+    status = ascc_step_create(s->context, s->model, &step, &s->step);
+    if (status != ASCC_OK)
+        ascc_host_complain(s->context, "step", status);
+    ascc_model_info info = {.size = sizeof info};
+    (void)ascc_model_get_info(s->model, &info);
+    s->time_step = o->time_step > 0.0 ? o->time_step : info.time_step;
+    return status == ASCC_OK;
+}
+
+static bool open_outputs(simulation *s)
+{
+    const size_t floats = s->scene.count * (size_t)s->scene.dimension + 1;
+    s->position = malloc(floats * sizeof *s->position);
+    s->velocity = malloc(floats * sizeof *s->velocity);
+    s->id = malloc((s->scene.count + 1) * sizeof *s->id);
+    if (!s->position || !s->velocity || !s->id) {
+        (void)snprintf(s->error, sizeof s->error, "no memory for %zu particles", s->scene.count);
+        return false;
+    }
+    (void)ascc_particles_get_ids(s->particles, ASCC_FLUID, 0, s->scene.count, s->id);
+    s->view = ascc_view_of(&s->scene);
+    if (!make_directory(s, s->o->frames) || !make_directory(s, s->o->ply))
+        return false;
+    if (!s->o->out)
+        return true;
+    ascc_sequence header = s->scene;
+    header.time_step = s->time_step * s->o->every;
+    if (s->o->has_gravity)
+        memcpy(header.gravity, s->o->gravity, sizeof header.gravity);
+    (void)snprintf(header.source, sizeof header.source, "ascc sim %s %s", s->o->model, s->o->scene);
+    s->writer = ascc_sequence_create(s->o->out, &header, true, s->error, sizeof s->error);
+    return s->writer != NULL;
+}
+
+static void close_all(simulation *s)
+{
+    ascc_step_destroy(&s->step);
+    ascc_particles_destroy(&s->particles);
+    ascc_model_destroy(&s->model);
+    ascc_context_destroy(&s->context);
+    ascc_sequence_free(&s->scene);
+    free(s->position);
+    free(s->velocity);
+    free(s->id);
+}
+
+int ascc_command_sim(int argc, char **argv)
+{
+    if (argc == 1 && strcmp(argv[0], "--help") == 0) {
+        usage(stdout);
+        return 0;
+    }
+    options o = {.every = 1, .threads = 1, .spacing = 0.05};
+    if (!read_arguments(&o, argc, argv))
+        return 2;
+    simulation s = {.o = &o};
+    bool good = load_scene(&o, &s.scene, s.error, sizeof s.error) && open_handles(&s) &&
+                open_outputs(&s) && measure(&s, &s.first);
+    if (good) {
+        (void)signal(SIGINT, on_interrupt);
+        good = advance(&s);
+        (void)signal(SIGINT, SIG_DFL);
+        print_table(&s);
+    }
+    char finish[512] = "";
+    /* What was computed before a step failed is kept; a frame that could not be written is not. */
+    if (s.writer && !ascc_sequence_finish(s.writer, s.steps > 0 || good, finish, sizeof finish)) {
+        fprintf(stderr, "ascc sim: %s\n", finish);
+        good = false;
+    }
+    if (s.error[0])
+        fprintf(stderr, "ascc sim: %s\n", s.error);
+    if (interrupted)
+        fprintf(stderr, "ascc sim: interrupted after %d steps\n", s.steps);
+    close_all(&s);
+    return good ? 0 : 1;
+}

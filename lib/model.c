@@ -1,0 +1,265 @@
+/* A model as a handle: loads, keeps and writes its file. SPDX-License-Identifier: MIT */
+#include "model.h"
+#include "description.h"
+#include "published.h"
+
+#include <stdatomic.h>
+#include <stdio.h>
+#include <string.h>
+
+#define MAX_FILE (1L << 30)
+
+struct ascc_model_shared {
+    atomic_int references;
+};
+
+static bool alive(const ascc_model *model)
+{
+    return model && model->magic == ASCC_MODEL_MAGIC;
+}
+
+/* ---- Lifetime ----------------------------------------------------------------------------------- */
+
+void ascc_model_retain(ascc_model *model)
+{
+    atomic_fetch_add_explicit(&model->shared->references, 1, memory_order_relaxed);
+}
+
+static void free_model(ascc_model *model)
+{
+    ascc_context *context = model->context;
+    const ascc_allocator *allocator = &context->allocator;
+    ascc_plan_release(allocator, &model->plan, model->weights, model->weight_count);
+    if (model->bytes)
+        ascc_release(allocator, model->bytes, model->byte_count, 1);
+    if (model->shared)
+        ascc_release(allocator, model->shared, 1, sizeof *model->shared);
+    model->magic = 0;
+    ascc_release(allocator, model, 1, sizeof *model);
+    ascc_context_release(context);
+}
+
+void ascc_model_release(ascc_model *model)
+{
+    if (atomic_fetch_sub_explicit(&model->shared->references, 1, memory_order_acq_rel) == 1)
+        free_model(model);
+}
+
+void ascc_model_destroy(ascc_model **model)
+{
+    if (!model || !*model)
+        return;
+    ascc_model *old = *model;
+    *model = NULL;
+    if (alive(old))
+        ascc_model_release(old);
+}
+
+/* ---- Reading ------------------------------------------------------------------------------------ */
+
+static ascc_status read_plan(ascc_safetensors *file, ascc_plan_builder *builder,
+                             ascc_message *message)
+{
+    const char *format = ascc_safetensors_metadata(file, "format");
+    const char *version = ascc_safetensors_metadata(file, "version");
+    if (!format || !version)
+        return ascc_fail(message, ASCC_ERROR_FORMAT,
+                         "__metadata__ states no '%s': not a model of libascc",
+                         format ? "version" : "format");
+    const bool own = strcmp(format, "ascc.model") == 0;
+    if (!own && strcmp(format, "ascc.weights") != 0)
+        return ascc_fail(message, ASCC_ERROR_FORMAT, "format '%s' is not a model's",
+                         ascc_quote(format).text);
+    if (strcmp(version, "1") != 0)
+        return ascc_fail(message, ASCC_ERROR_FORMAT, "version '%s' of %s is not known; 1 is",
+                         ascc_quote(version).text, format);
+    if (!own)
+        return ascc_published_read(builder, file);
+    const char *network = ascc_safetensors_metadata(file, "network");
+    if (!network)
+        return ascc_fail(message, ASCC_ERROR_FORMAT, "__metadata__ states no 'network'");
+    return ascc_description_read(builder, network);
+}
+
+static ascc_status read_model(ascc_model *model, ascc_message *message)
+{
+    const ascc_allocator *allocator = &model->context->allocator;
+    ascc_safetensors file;
+    ascc_plan_builder builder;
+    ascc_status status =
+        ascc_safetensors_open(allocator, model->bytes, model->byte_count, &file, message);
+    if (status != ASCC_OK)
+        return status;
+    status = ascc_plan_open(allocator, &file, &builder, message);
+    if (status == ASCC_OK) {
+        status = read_plan(&file, &builder, message);
+        if (status == ASCC_OK)
+            status =
+                ascc_plan_finish(&builder, &model->plan, &model->weights, &model->weight_count);
+        ascc_plan_close(&builder);
+    }
+    ascc_safetensors_close(&file);
+    return status;
+}
+
+/* Takes bytes[size], which the context's allocator gave; on failure they are released too. */
+static ascc_status load_bytes(ascc_context *context, unsigned char *bytes, size_t size,
+                              ascc_model **model)
+{
+    const ascc_allocator *allocator = &context->allocator;
+    ascc_message message = {""};
+    ascc_status status = ASCC_OK;
+    ascc_model *made = ascc_allocate(allocator, 1, sizeof *made);
+    if (!made) {
+        ascc_release(allocator, bytes, size, 1);
+        ascc_fail(&message, ASCC_ERROR_MEMORY, "model: no memory");
+        return ascc_context_fail(context, ASCC_ERROR_MEMORY, &message);
+    }
+    *made = (ascc_model){
+        .magic = ASCC_MODEL_MAGIC, .context = context, .bytes = bytes, .byte_count = size};
+    ascc_context_retain(context);
+    made->shared = ascc_allocate(allocator, 1, sizeof *made->shared);
+    if (made->shared) {
+        atomic_init(&made->shared->references, 1);
+        status = read_model(made, &message);
+    } else {
+        status = ascc_fail(&message, ASCC_ERROR_MEMORY, "model: no memory");
+    }
+    if (status != ASCC_OK) {
+        ascc_context_fail(context, status, &message);
+        free_model(made);
+        return status;
+    }
+    *model = made;
+    return ASCC_OK;
+}
+
+/* The checks that both loaders begin with. */
+static ascc_status begin_load(ascc_context *context, const void *source, ascc_model **model)
+{
+    ascc_message message = {""};
+    if (model)
+        *model = NULL;
+    if (!context || context->magic != ASCC_CONTEXT_MAGIC)
+        return ASCC_ERROR_ARGUMENT;
+    if (model && source)
+        return ASCC_OK;
+    ascc_fail(&message, ASCC_ERROR_ARGUMENT, "model: a NULL argument");
+    return ascc_context_fail(context, ASCC_ERROR_ARGUMENT, &message);
+}
+
+ascc_status ascc_model_load_memory(ascc_context *context, const void *data, size_t size,
+                                   ascc_model **model)
+{
+    ascc_message message = {""};
+    const ascc_status status = begin_load(context, data, model);
+    if (status != ASCC_OK)
+        return status;
+    unsigned char *bytes = ascc_allocate(&context->allocator, size, 1);
+    if (!bytes) {
+        ascc_fail(&message, ASCC_ERROR_MEMORY, "model: no memory for %zu bytes", size);
+        return ascc_context_fail(context, ASCC_ERROR_MEMORY, &message);
+    }
+    memcpy(bytes, data, size);
+    return load_bytes(context, bytes, size, model);
+}
+
+/* The whole file, *size bytes. */
+static ascc_status read_file(const ascc_allocator *allocator, FILE *file, unsigned char **bytes,
+                             size_t *size)
+{
+    if (fseek(file, 0, SEEK_END) != 0)
+        return ASCC_ERROR_FILE;
+    const long end = ftell(file);
+    if (end < 0 || end > MAX_FILE || fseek(file, 0, SEEK_SET) != 0)
+        return ASCC_ERROR_FILE;
+    *size = (size_t)end;
+    *bytes = ascc_allocate(allocator, *size, 1);
+    if (!*bytes)
+        return ASCC_ERROR_MEMORY;
+    if (fread(*bytes, 1, *size, file) == *size)
+        return ASCC_OK;
+    ascc_release(allocator, *bytes, *size, 1);
+    return ASCC_ERROR_FILE;
+}
+
+ascc_status ascc_model_load(ascc_context *context, const char *path, ascc_model **model)
+{
+    ascc_message message = {""};
+    unsigned char *bytes = NULL;
+    size_t size = 0;
+    ascc_status status = begin_load(context, path, model);
+    if (status != ASCC_OK)
+        return status;
+    FILE *file = fopen(path, "rb");
+    if (!file) {
+        ascc_fail(&message, ASCC_ERROR_FILE, "model: cannot open '%s'", path);
+        return ascc_context_fail(context, ASCC_ERROR_FILE, &message);
+    }
+    status = read_file(&context->allocator, file, &bytes, &size);
+    fclose(file);
+    if (status == ASCC_OK)
+        return load_bytes(context, bytes, size, model);
+    ascc_fail(&message, status, "model: %s '%s'",
+              status == ASCC_ERROR_MEMORY ? "no memory for" : "cannot read", path);
+    return ascc_context_fail(context, status, &message);
+}
+
+/* ---- Writing and telling ------------------------------------------------------------------------ */
+
+ascc_status ascc_model_save(const ascc_model *model, const char *path)
+{
+    ascc_message message = {""};
+    if (!alive(model))
+        return ASCC_ERROR_ARGUMENT;
+    if (!path) {
+        ascc_fail(&message, ASCC_ERROR_ARGUMENT, "model: a NULL argument");
+        return ascc_context_fail(model->context, ASCC_ERROR_ARGUMENT, &message);
+    }
+    FILE *file = fopen(path, "wb");
+    bool written = file != NULL;
+    if (file) {
+        written = fwrite(model->bytes, 1, model->byte_count, file) == model->byte_count;
+        written = fclose(file) == 0 && written;
+    }
+    if (written)
+        return ASCC_OK;
+    ascc_fail(&message, ASCC_ERROR_FILE, "model: cannot write '%s'", path);
+    return ascc_context_fail(model->context, ASCC_ERROR_FILE, &message);
+}
+
+const void *ascc_model_bytes(const ascc_model *model, size_t *size)
+{
+    if (size)
+        *size = alive(model) ? model->byte_count : 0;
+    return alive(model) ? model->bytes : NULL;
+}
+
+ascc_status ascc_model_get_info(const ascc_model *model, ascc_model_info *info)
+{
+    if (!alive(model) || !info)
+        return ASCC_ERROR_ARGUMENT;
+    const ascc_plan *plan = &model->plan;
+    const bool antisymmetric = plan->output.kind == ASCC_OUTPUT_ANTISYMMETRIC;
+    const ascc_model_info own = {
+        .dimension = plan->dimension,
+        .level_count = plan->level_count,
+        .layer_count = plan->layer_count + (antisymmetric ? 1 : 0),
+        .conserves_momentum = antisymmetric,
+        /* Central impulses at x make no torque about x; at advected positions they do. */
+        .conserves_angular_momentum =
+            antisymmetric && plan->output.radial && plan->advection == ASCC_ADVECT_NONE,
+        .advected = plan->advection != ASCC_ADVECT_NONE,
+        .neighbor_limit = ascc_plan_neighbor_limit(plan),
+        .parameter_count = plan->parameter_count,
+        .time_step = plan->time_step,
+        .gravity = {plan->gravity[0], plan->gravity[1], plan->gravity[2]},
+        .particle_spacing = plan->spacing,
+        .rest_density = plan->rest_density,
+        .support_radius = ascc_plan_support_radius(plan),
+        .receptive_radius = ascc_plan_receptive_radius(plan),
+        .name = plan->name,
+        .description = plan->description,
+    };
+    return ascc_write_struct(info, &own, sizeof own, sizeof own) ? ASCC_OK : ASCC_ERROR_ARGUMENT;
+}

@@ -1,0 +1,139 @@
+/* libFuzzer entry: loads a model from bytes and, if it loads, checks what every plan promises.
+ * SPDX-License-Identifier: MIT
+ *
+ * The first byte says what the rest is, so that the fuzzer reaches beyond the header's length field
+ * and the escaping of texts within texts:
+ *   'f'  a whole file
+ *   'h'  a header; what follows a byte 0xff is the data
+ *   'n'  the network of a file of libascc's own, whose tensors are right for the corpus
+ *   'd'  the architecture of a published DMCF network, likewise
+ *   'c'  that of a published CConv network
+ */
+#include <stdint.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "model.h"
+#include "support/model_builder.h"
+
+int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
+
+static void require(int condition)
+{
+    if (!condition)
+        abort();
+}
+
+static float sum; /* keeps the reads below */
+
+static void read_all(const float *values, size_t count)
+{
+    for (size_t i = 0; i < count; i++)
+        sum += values[i];
+}
+
+static size_t cell_count(const ascc_filter *filter)
+{
+    return (size_t)filter->cells[0] * (size_t)filter->cells[1] * (size_t)filter->cells[2];
+}
+
+static void check_plan(const ascc_plan *plan)
+{
+    for (int32_t i = 0; i < plan->layer_count; i++) {
+        const ascc_layer *layer = &plan->layer[i];
+        require(layer->set >= 0 && layer->set < ASCC_SET_LEVEL + plan->level_count - 1);
+        require(layer->term_count > 0 && layer->channels > 0);
+        for (int32_t t = layer->first_term; t < layer->first_term + layer->term_count; t++) {
+            const ascc_term *term = &plan->term[t];
+            const size_t pairs = (size_t)term->inputs * (size_t)term->outputs;
+            require(term->source >= 0 && term->source <= i + 1);
+            require(term->column >= 0 && term->column + term->outputs <= layer->channels);
+            if (term->kind == ASCC_TERM_CONVOLUTION)
+                read_all(term->weight, cell_count(&term->filter) * pairs);
+            else if (term->kind == ASCC_TERM_DENSE)
+                read_all(term->weight, pairs);
+            if (term->bias)
+                read_all(term->bias, (size_t)term->outputs);
+        }
+    }
+    const ascc_output *output = &plan->output;
+    require(output->source >= 0 && output->source < plan->layer_count + 2);
+    if (output->kind == ASCC_OUTPUT_ANTISYMMETRIC)
+        read_all(output->weight,
+                 cell_count(&output->filter) * (size_t)output->inputs * (size_t)plan->dimension);
+}
+
+static void load(const void *bytes, size_t size)
+{
+    ascc_context *context = NULL;
+    ascc_model *model = NULL;
+    if (ascc_context_create(NULL, &context) != ASCC_OK)
+        return;
+    if (ascc_model_load_memory(context, bytes, size, &model) == ASCC_OK) {
+        ascc_model_info info = {.size = sizeof info};
+        size_t kept = 0;
+        require(ascc_model_get_info(model, &info) == ASCC_OK);
+        require(memcmp(ascc_model_bytes(model, &kept), bytes, size) == 0 && kept == size);
+        check_plan(&model->plan);
+    } else {
+        char text[16];
+        require(model == NULL && ascc_context_message(context, text, sizeof text) > 0);
+    }
+    ascc_model_destroy(&model);
+    ascc_context_destroy(&context);
+}
+
+/* A file around a header that may hold any bytes. */
+static void load_header(const uint8_t *data, size_t size)
+{
+    const uint8_t *end = size ? memchr(data, 0xff, size) : NULL;
+    const size_t length = end ? (size_t)(end - data) : size, rest = end ? size - length - 1 : 0;
+    unsigned char *bytes = malloc(8 + length + rest);
+    require(bytes != NULL);
+    for (int i = 0; i < 8; i++)
+        bytes[i] = (unsigned char)((uint64_t)length >> 8 * i);
+    memcpy(bytes + 8, data, length);
+    if (rest > 0)
+        memcpy(bytes + 8 + length, end + 1, rest);
+    load(bytes, 8 + length + rest);
+    free(bytes);
+}
+
+/* The network or architecture of a file with the right tensors, given as text. */
+static void load_text(const uint8_t *data, size_t size, char kind)
+{
+    char *text = malloc(size + 1);
+    size_t made;
+    require(text != NULL);
+    memcpy(text, data, size);
+    text[size] = '\0';
+    for (size_t i = 0; i < size; i++)
+        if ((unsigned char)text[i] < 0x20)
+            text[i] = ' ';
+    unsigned char *bytes = model_builder_described(kind, text, &made);
+    load(bytes, made);
+    free(bytes);
+    free(text);
+}
+
+int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
+{
+    if (size == 0)
+        return 0;
+    switch (data[0]) {
+    case 'f':
+        load(data + 1, size - 1);
+        break;
+    case 'h':
+        load_header(data + 1, size - 1);
+        break;
+    case 'n':
+    case 'd':
+    case 'c':
+        load_text(data + 1, size - 1, (char)data[0]);
+        break;
+    default:
+        break;
+    }
+    return 0;
+}

@@ -1,0 +1,545 @@
+/* Builds model files in memory for tests. SPDX-License-Identifier: MIT */
+#include "model_builder.h"
+
+#include "../../examples/demo_model.h"
+
+#include <math.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* ---- Text --------------------------------------------------------------------------------------- */
+
+static void reserve(model_text *text, size_t more)
+{
+    if (text->length + more <= text->capacity)
+        return;
+    text->capacity = 2 * (text->length + more);
+    text->text = realloc(text->text, text->capacity);
+    if (!text->text)
+        abort();
+}
+
+void model_text_add(model_text *text, const char *format, ...)
+{
+    va_list arguments, again;
+    va_start(arguments, format);
+    va_copy(again, arguments);
+    char probe[1];
+    const int length = vsnprintf(probe, sizeof probe, format, arguments);
+    va_end(arguments);
+    reserve(text, (size_t)length + 1);
+    vsnprintf(text->text + text->length, (size_t)length + 1, format, again);
+    va_end(again);
+    text->length += (size_t)length;
+}
+
+static void add_bytes(model_text *text, const void *bytes, size_t size)
+{
+    reserve(text, size + 1);
+    if (size > 0)
+        memcpy(text->text + text->length, bytes, size);
+    text->length += size;
+    text->text[text->length] = '\0';
+}
+
+void model_text_free(model_text *text)
+{
+    free(text->text);
+    *text = (model_text){NULL, 0, 0};
+}
+
+const char *model_number(double value)
+{
+    static _Thread_local char buffers[8][32];
+    static _Thread_local unsigned next;
+    char raw[32], *text = buffers[next++ % 8];
+    size_t used = 0;
+    snprintf(raw, sizeof raw, "%.17g", value);
+    for (const char *c = raw; *c != '\0'; c++) {
+        if (strchr("0123456789+-e", *c))
+            text[used++] = *c;
+        else if (used > 0 && text[used - 1] != '.')
+            text[used++] = '.';
+    }
+    text[used] = '\0';
+    return text;
+}
+
+static void add_escaped(model_text *text, const char *value)
+{
+    for (; *value != '\0'; value++) {
+        if (*value == '"' || *value == '\\')
+            add_bytes(text, "\\", 1);
+        add_bytes(text, value, 1);
+    }
+}
+
+/* ---- Files -------------------------------------------------------------------------------------- */
+
+void model_builder_open(model_builder *builder)
+{
+    memset(builder, 0, sizeof *builder);
+}
+
+void model_builder_metadata(model_builder *builder, const char *key, const char *value)
+{
+    model_text_add(&builder->metadata, "%s\"%s\":\"", builder->metadata.length ? "," : "", key);
+    add_escaped(&builder->metadata, value);
+    model_text_add(&builder->metadata, "\"");
+}
+
+void model_builder_tensor(model_builder *builder, const char *name, int rank, const size_t *shape,
+                          const float *values)
+{
+    size_t count = 1;
+    const size_t begin = builder->data.length;
+    model_text_add(&builder->tensors, ",\"%s\":{\"dtype\":\"F32\",\"shape\":[", name);
+    for (int i = 0; i < rank; i++) {
+        model_text_add(&builder->tensors, "%s%zu", i ? "," : "", shape[i]);
+        count *= shape[i];
+    }
+    for (size_t i = 0; i < count; i++) {
+        uint32_t bits;
+        memcpy(&bits, &values[i], sizeof bits);
+        const unsigned char bytes[4] = {(unsigned char)bits, (unsigned char)(bits >> 8),
+                                        (unsigned char)(bits >> 16), (unsigned char)(bits >> 24)};
+        add_bytes(&builder->data, bytes, 4);
+    }
+    model_text_add(&builder->tensors, "],\"data_offsets\":[%zu,%zu]}", begin, builder->data.length);
+}
+
+unsigned char *model_builder_raw(const char *header, const void *data, size_t data_size,
+                                 size_t *size)
+{
+    const size_t length = strlen(header);
+    unsigned char *bytes = malloc(8 + length + data_size);
+    if (!bytes)
+        abort();
+    for (int i = 0; i < 8; i++)
+        bytes[i] = (unsigned char)((uint64_t)length >> 8 * i);
+    memcpy(bytes + 8, header, length);
+    if (data_size > 0)
+        memcpy(bytes + 8 + length, data, data_size);
+    *size = 8 + length + data_size;
+    return bytes;
+}
+
+unsigned char *model_builder_finish(model_builder *builder, size_t *size)
+{
+    model_text header = {NULL, 0, 0};
+    model_text_add(&header, "{\"__metadata__\":{%s}%s}",
+                   builder->metadata.text ? builder->metadata.text : "",
+                   builder->tensors.text ? builder->tensors.text : "");
+    while (header.length % 8 != 0)
+        model_text_add(&header, " ");
+    unsigned char *bytes =
+        model_builder_raw(header.text, builder->data.text, builder->data.length, size);
+    model_text_free(&header);
+    model_text_free(&builder->metadata);
+    model_text_free(&builder->tensors);
+    model_text_free(&builder->data);
+    return bytes;
+}
+
+unsigned char *model_builder_demo(int dimension, double spacing, size_t *size)
+{
+    return demo_model_bytes(dimension, spacing, size);
+}
+
+/* ---- Random weights ----------------------------------------------------------------------------- */
+
+static uint64_t next_random(uint64_t *state)
+{
+    uint64_t z = *state += 0x9e3779b97f4a7c15u;
+    z = (z ^ z >> 30) * 0xbf58476d1ce4e5b9u;
+    z = (z ^ z >> 27) * 0x94d049bb133111ebu;
+    return z ^ z >> 31;
+}
+
+/* A tensor of values within +-amplitude. */
+static void add_random(model_builder *builder, uint64_t *state, const char *name, int rank,
+                       const size_t *shape, double amplitude)
+{
+    size_t count = 1;
+    for (int i = 0; i < rank; i++)
+        count *= shape[i];
+    float *values = calloc(count + 1, sizeof *values);
+    if (!values)
+        abort();
+    for (size_t i = 0; i < count; i++)
+        values[i] = (float)(amplitude * ((double)(next_random(state) >> 11) * 0x1p-52 - 1.0));
+    model_builder_tensor(builder, name, rank, shape, values);
+    free(values);
+}
+
+/* name.kernel and name.bias of a convolution (cells > 0) or a dense term. */
+static void add_weights(model_builder *builder, uint64_t *state, const char *name, int dimension,
+                        int cells, int in, int out, double gain)
+{
+    char text[64];
+    const size_t c = (size_t)cells, depth = dimension == 3 ? c : 1;
+    const size_t kernel[5] = {depth, c, c, (size_t)in, (size_t)out};
+    const size_t *shape = cells ? kernel : kernel + 3;
+    snprintf(text, sizeof text, "%s.kernel", name);
+    add_random(builder, state, text, cells ? 5 : 2, shape, gain / sqrt(in));
+    snprintf(text, sizeof text, "%s.bias", name);
+    add_random(builder, state, text, 1, kernel + 4, 0.1 * gain);
+}
+
+/* The last kernel: whole and exactly antisymmetric, or its half along an axis. */
+static void add_output_kernel(model_builder *builder, uint64_t *state, const model_random *o)
+{
+    const size_t c = (size_t)o->output_cells, depth = o->dimension == 3 ? c : 1;
+    const size_t in = (size_t)o->channels, values = in * (size_t)o->dimension;
+    size_t shape[5] = {depth, c, c, in, (size_t)o->dimension};
+    const double amplitude = o->gain / sqrt((double)in);
+    if (o->half_axis) {
+        shape[2 - (o->half_axis[0] - 'x')] /= 2;
+        add_random(builder, state, "output.kernel", 5, shape, amplitude);
+        return;
+    }
+    const size_t count = depth * c * c;
+    float *kernel = calloc(count * values, sizeof *kernel);
+    if (!kernel)
+        abort();
+    for (size_t i = 0; i < count / 2; i++)
+        for (size_t j = 0; j < values; j++) {
+            const double random = (double)(next_random(state) >> 11) * 0x1p-52 - 1.0;
+            kernel[i * values + j] = (float)(amplitude * random);
+            kernel[(count - 1 - i) * values + j] = -kernel[i * values + j];
+        }
+    model_builder_tensor(builder, "output.kernel", 5, shape, kernel);
+    free(kernel);
+}
+
+/* ---- The random network ------------------------------------------------------------------------- */
+
+typedef struct random_network {
+    model_random o; /* with the defaults filled in */
+    model_builder builder;
+    model_text text;
+    uint64_t state;
+    int terms; /* of the layer being written */
+} random_network;
+
+static void add_filter(random_network *n, int level, const char *window)
+{
+    model_text_add(&n->text, ",\"radius\":%s,\"window\":\"%s\",\"mapping\":\"%s\"",
+                   model_number(n->o.spacing * 2.0 * (double)(1 << level)), window, n->o.mapping);
+    if (n->o.neighbor_limit)
+        model_text_add(&n->text, ",\"neighbor_limit\":%d", n->o.neighbor_limit);
+}
+
+static void add_convolution(random_network *n, const char *name, const char *source, int relu,
+                            int column, int level, int in, int out)
+{
+    model_text_add(&n->text,
+                   "%s{\"type\":\"convolution\",\"source\":\"%s\",\"relu\":%s,\"column\":%d,"
+                   "\"kernel\":\"%s.kernel\",\"bias\":\"%s.bias\"",
+                   n->terms++ ? "," : "", source, relu ? "true" : "false", column, name, name);
+    add_filter(n, level, n->o.window);
+    model_text_add(&n->text, ",\"skip_self\":%s}", n->o.skip_self ? "true" : "false");
+    add_weights(&n->builder, &n->state, name, n->o.dimension, n->o.cells, in, out, n->o.gain / 4.0);
+}
+
+static void add_dense(random_network *n, const char *name, const char *source, int relu, int column,
+                      int in, int out)
+{
+    model_text_add(&n->text,
+                   "%s{\"type\":\"dense\",\"source\":\"%s\",\"relu\":%s,\"column\":%d,"
+                   "\"weight\":\"%s.kernel\",\"bias\":\"%s.bias\"}",
+                   n->terms++ ? "," : "", source, relu ? "true" : "false", column, name, name);
+    add_weights(&n->builder, &n->state, name, n->o.dimension, 0, in, out, n->o.gain);
+}
+
+static void add_first_layer(random_network *n)
+{
+    const int in = 1 + n->o.dimension, quarter = n->o.channels / 4;
+    model_text_add(&n->text, "{\"name\":\"l0.0\",\"points\":\"%s\",\"channels\":%d,\"terms\":[",
+                   n->o.fluid_only ? "fluid" : "all", n->o.channels);
+    n->terms = 0;
+    add_convolution(n, "conv_fluid", "fluid", 0, 0, 0, in, quarter);
+    add_convolution(n, "conv_boundary", "boundary", 0, quarter, 0, in, quarter);
+    add_dense(n, "dense_fluid", "fluid", 0, 2 * quarter, in, 2 * quarter);
+    if (!n->o.fluid_only)
+        add_dense(n, "dense_boundary", "boundary", 0, 2 * quarter, in, 2 * quarter);
+    model_text_add(&n->text, "]}");
+}
+
+/* Layer `layer` on each level, from every level that the layer before has. */
+static void add_trunk_layer(random_network *n, int layer)
+{
+    const int last = layer == n->o.trunk_layers, c = n->o.channels;
+    const int sources = layer == 1 ? 1 : n->o.levels;
+    for (int d = 0; d < (last ? 1 : n->o.levels); d++) {
+        char points[16], name[32], source[32];
+        snprintf(points, sizeof points, d ? "level%d" : n->o.fluid_only ? "fluid" : "all", d);
+        const int width = last && n->o.plain ? n->o.dimension : c;
+        model_text_add(&n->text,
+                       ",{\"name\":\"l%d.%d\",\"points\":\"%s\",\"channels\":%d,\"terms\":[", layer,
+                       d, points, width);
+        n->terms = 0;
+        for (int s = 0; s < sources; s++) {
+            snprintf(name, sizeof name, "l%d.conv_%d_%d", layer, s, d);
+            snprintf(source, sizeof source, "l%d.%d", layer - 1, s);
+            add_convolution(n, name, source, 1, 0, s > d ? s : d, c, width);
+        }
+        if (d < sources) {
+            snprintf(name, sizeof name, "l%d.dense_%d", layer, d);
+            snprintf(source, sizeof source, "l%d.%d", layer - 1, d);
+            add_dense(n, name, source, 1, 0, c, width);
+            if (width == c)
+                model_text_add(&n->text, ",{\"type\":\"identity\",\"source\":\"%s\"}", source);
+        }
+        model_text_add(&n->text, "]}");
+    }
+}
+
+static void add_head(random_network *n)
+{
+    const model_random *o = &n->o;
+    const char *third = o->dimension == 3 ? ",0" : "";
+    model_text_add(&n->text,
+                   "{\"name\":\"random\",\"description\":\"random weights, for tests\","
+                   "\"dimension\":%d,\"time_step\":%s,\"gravity\":[0,-9.8125%s],"
+                   "\"particle_spacing\":%s,\"rest_density\":1000,\"evaluate\":\"%s\","
+                   "\"features\":{\"fluid\":[\"one\",\"velocity\"],"
+                   "\"boundary\":[\"one\",\"normal\"]}",
+                   o->dimension, model_number(0.005), third, model_number(o->spacing), o->evaluate);
+    if (o->boundary_crop > 0.0)
+        model_text_add(&n->text, ",\"boundary_crop\":%s",
+                       model_number(o->boundary_crop * o->spacing));
+    if (o->levels == 1)
+        return;
+    const int farthest = strcmp(o->method, "farthest") == 0;
+    model_text_add(&n->text, ",\"levels\":[");
+    for (int i = 1; i < o->levels; i++)
+        model_text_add(
+            &n->text, "%s{\"%s\":%s}", i > 1 ? "," : "", farthest ? "ratio" : "voxel",
+            model_number(farthest ? 1.0 / (double)(1 << i) : o->spacing * (double)(1 << i)));
+    model_text_add(&n->text, "],\"sampling\":{\"method\":\"%s\"", o->method);
+    if (!farthest)
+        model_text_add(&n->text, ",\"anchor\":\"%s\"", o->anchor);
+    if (strcmp(o->method, "voxel_corners") == 0)
+        model_text_add(&n->text, ",\"hysteresis\":%s", model_number(0.1));
+    model_text_add(&n->text, "}");
+}
+
+static void add_output(random_network *n)
+{
+    const model_random *o = &n->o;
+    model_text_add(&n->text,
+                   "],\"output\":{\"type\":\"%s\",\"source\":\"l%d.0\",\"relu\":%s,\"scale\":%s",
+                   o->plain ? "plain" : "antisymmetric", o->trunk_layers,
+                   o->plain ? "false" : "true", model_number(o->scale * o->spacing));
+    if (!o->plain) {
+        model_text_add(&n->text, ",\"kernel\":\"output.kernel\",\"projection\":\"%s\"",
+                       o->projection);
+        if (o->half_axis)
+            model_text_add(&n->text, ",\"stored\":\"half\",\"half_axis\":\"%s\"", o->half_axis);
+        else
+            model_text_add(&n->text, ",\"stored\":\"full\"");
+        add_filter(n, 0, "peak");
+        add_output_kernel(&n->builder, &n->state, o);
+    }
+    model_text_add(&n->text, "}}");
+}
+
+/* With `network` the file describes itself by that text; with `described` the right one is handed
+ * out. */
+static unsigned char *random_file(const model_random *options, const char *network,
+                                  char **described, size_t *size)
+{
+    random_network n = {.o = *options, .state = options->seed};
+    model_random *o = &n.o;
+    o->dimension = o->dimension ? o->dimension : 2;
+    o->levels = o->levels ? o->levels : 1;
+    o->channels = o->channels ? o->channels : 8;
+    o->trunk_layers = o->trunk_layers ? o->trunk_layers : 2;
+    o->cells = o->cells ? o->cells : 4;
+    o->output_cells = o->output_cells ? o->output_cells : 6;
+    o->spacing = o->spacing > 0.0 ? o->spacing : 0.05;
+    o->gain = o->gain > 0.0 ? o->gain : 1.0;
+    o->scale = o->scale > 0.0 ? o->scale : 0.01;
+    o->evaluate = o->evaluate ? o->evaluate : "current";
+    o->projection = o->projection ? o->projection : "radial";
+    o->method = o->method ? o->method : "voxel_centers";
+    o->anchor = o->anchor ? o->anchor : "world";
+    o->window = o->window ? o->window : "poly6";
+    o->mapping = o->mapping ? o->mapping : "volume";
+
+    model_builder_open(&n.builder);
+    add_head(&n);
+    model_text_add(&n.text, ",\"layers\":[");
+    add_first_layer(&n);
+    for (int layer = 1; layer <= o->trunk_layers; layer++)
+        add_trunk_layer(&n, layer);
+    add_output(&n);
+    model_builder_metadata(&n.builder, "format", "ascc.model");
+    model_builder_metadata(&n.builder, "version", "1");
+    model_builder_metadata(&n.builder, "network", network ? network : n.text.text);
+    if (described)
+        *described = n.text.text;
+    else
+        model_text_free(&n.text);
+    return model_builder_finish(&n.builder, size);
+}
+
+unsigned char *model_builder_random(const model_random *options, size_t *size)
+{
+    return random_file(options, NULL, NULL, size);
+}
+
+/* ---- Small networks described as the published ones --------------------------------------------- */
+
+/* Metadata with one piece of text replaced. */
+static void add_replaced(model_builder *builder, const char *key, const char *value,
+                         const char *from, const char *to)
+{
+    const char *found = from ? strstr(value, from) : NULL;
+    model_text text = {NULL, 0, 0};
+    if (found)
+        model_text_add(&text, "%.*s%s%s", (int)(found - value), value, to, found + strlen(from));
+    else
+        model_text_add(&text, "%s", value);
+    model_builder_metadata(builder, key, text.text);
+    model_text_free(&text);
+}
+
+static void add_published(model_builder *builder, const char *architecture, const char *floats,
+                          const char *from, const char *to)
+{
+    add_replaced(builder, "format", "ascc.weights", NULL, NULL);
+    add_replaced(builder, "version", "1", NULL, NULL);
+    add_replaced(builder, "model", "small", NULL, NULL);
+    add_replaced(builder, "dim", "3", from, to);
+    add_replaced(builder, "kernel_axis_order", "[z,y,x,in,out] row-major: axis 0 is z (slowest)",
+                 from, to);
+    add_replaced(builder, "floats", floats, from, to);
+    add_replaced(builder, "architecture", architecture, from, to);
+}
+
+static const char dmcf_architecture[] =
+    "{\"network\": \"DMCF SymNet (HRNet trunk + antisymmetric output convolution), dim 3\", "
+    "\"timestep\": 0.02, \"gravity\": [0, -9.81, 0], "
+    "\"integration\": \"v2=v1+dt*g; p2=p1+dt*v2; p=p2+correction; v=(p-p1)/dt\", "
+    "\"features\": {\"fluid\": [\"1\", \"v2.x\", \"v2.y\", \"v2.z\"], "
+    "\"boundary\": [\"1\", \"n.x\", \"n.y\", \"n.z\"], \"use_vel\": true, \"use_acc\": false, "
+    "\"use_feats\": false, \"use_box_feats\": true, \"density_features\": false}, "
+    "\"use_boundary_in_all_layers\": true, "
+    "\"boundary_crop\": \"keep b iff min(p2)-0.8 <= b <= max(p2)+0.8 per axis\", "
+    "\"branches\": [{\"stride\": 1, \"radius\": 0.1, \"points\": \"fluid then kept "
+    "boundary\"}, {\"stride\": 2, \"radius\": 0.2, \"voxel\": 0.05}], "
+    "\"sampling\": {\"base_voxel\": 0.025, \"centralize\": true, \"hysteresis\": 0.1, "
+    "\"pad\": 0, \"source\": \"branch 0 points for every branch\"}, "
+    "\"cross_branch_radius\": \"radius of the coarser of the two branches\", "
+    "\"conv\": {\"kernel_size\": [2, 2, 2], \"window\": \"poly6: clip((1-q)^3,0,1), "
+    "q=d^2/r^2\", \"coordinate_mapping\": \"ball_to_cube_volume_preserving\", "
+    "\"interpolation\": \"trilinear, clamped\", \"align_corners\": true, "
+    "\"normalize\": false, \"ignore_query_point\": false, \"bias\": true}, "
+    "\"antisymmetric\": {\"kernel_size\": [2, 4, 2], "
+    "\"stored\": \"sym0.kernel_half [2,2,2,2,3]\", \"sym_axis\": 1, "
+    "\"full\": \"concat(axis=1: -half[::-1,::-1,::-1], half)\", "
+    "\"window\": \"peak: (1-sqrt(q))^2\", \"radius\": 0.1, \"ignore_query_point\": true, "
+    "\"bias\": false, "
+    "\"formula\": \"out_i = sum_k a_ik (f_i+f_k) g(x_k-x_i), f=relu(l2.out_0)\"}, "
+    "\"merge\": \"sum (add_merge)\", "
+    "\"activation\": \"relu on the input of every l1,l2 convolution/dense and of the "
+    "antisymmetric convolution; none on inputs of layer 0 and none on outputs\", "
+    "\"residual\": \"l2.out_0 += l1.out_0 (before relu); no other layer has equal widths\", "
+    "\"dense\": \"fluid and boundary rows each have their own layer-0 dense; l1.dense_0, "
+    "l2.dense_0 act on relu(features) of the same branch and are added\", "
+    "\"layers\": [{\"name\": \"l0\", \"out\": 3, \"concat\": [\"conv_fluid(1)\", "
+    "\"conv_obstacle(1)\", \"dense_fluid|dense_obstacle(1)\"]}, "
+    "{\"name\": \"l1\", \"inputs\": {\"0\": 3}, \"outputs\": {\"0\": 2, \"1\": 1}}, "
+    "{\"name\": \"l2\", \"inputs\": {\"0\": 2, \"1\": 1}, \"outputs\": {\"0\": 2}}, "
+    "{\"name\": \"sym0\", \"inputs\": {\"0\": 2}, \"outputs\": {\"0\": 3}}], "
+    "\"out_scale\": [0.0078125, 0.0078125, 0.0078125]}";
+
+unsigned char *model_builder_dmcf(const char *from, const char *to, size_t *size)
+{
+    static const struct {
+        const char *name;
+        int cells, in, out;
+    } terms[] = {{"conv_fluid", 2, 4, 1},     {"conv_obstacle", 2, 4, 1}, {"dense_fluid", 0, 4, 1},
+                 {"dense_obstacle", 0, 4, 1}, {"l1.conv_0_0", 2, 3, 2},   {"l1.conv_0_1", 2, 3, 1},
+                 {"l1.dense_0", 0, 3, 2},     {"l2.conv_0_0", 2, 2, 2},   {"l2.conv_1_0", 2, 1, 2},
+                 {"l2.dense_0", 0, 2, 2}};
+    model_builder builder;
+    uint64_t state = 1;
+    model_builder_open(&builder);
+    for (size_t i = 0; i < sizeof terms / sizeof *terms; i++)
+        add_weights(&builder, &state, terms[i].name, 3, terms[i].cells, terms[i].in, terms[i].out,
+                    1.0);
+    add_random(&builder, &state, "sym0.kernel_half", 5, (const size_t[]){2, 2, 2, 2, 3}, 1.0);
+    char floats[32];
+    snprintf(floats, sizeof floats, "%zu", builder.data.length / 4);
+    add_published(&builder, dmcf_architecture, floats, from, to);
+    add_replaced(&builder, "trained_with",
+                 "gravity -9.81 along y, particle spacing 0.0625 m, boundary about 970 points per "
+                 "m^2, dt 0.02 s",
+                 from, to);
+    return model_builder_finish(&builder, size);
+}
+
+static const char cconv_architecture[] =
+    "{\"network\": \"CConv (Ummenhofer et al. ICLR 2020), dim 3\", \"timestep\": 0.02, "
+    "\"gravity\": [0, -9.81, 0], "
+    "\"integration\": \"v2=v1+dt*g; p2=p1+dt*(v1+v2)/2; p=p2+correction; v=(p-p1)/dt\", "
+    "\"features\": {\"fluid\": [\"1\", \"v2.x\", \"v2.y\", \"v2.z\"], "
+    "\"boundary\": [\"n.x\", \"n.y\", \"n.z\"]}, \"boundary_crop\": \"none\", "
+    "\"conv\": {\"kernel_size\": [2, 2, 2], \"radius\": 0.1125, \"extent\": 0.225, "
+    "\"window\": \"poly6: clip((1-q)^3,0,1), q=d^2/r^2\", "
+    "\"coordinate_mapping\": \"ball_to_cube_volume_preserving\", "
+    "\"interpolation\": \"trilinear, clamped\", \"align_corners\": true, "
+    "\"normalize\": false, \"ignore_query_point\": true, \"bias\": true}, "
+    "\"layers\": \"A0=concat(conv0_obstacle(1),conv0_fluid(1),dense0_fluid(1)) at fluid "
+    "points; for i=1..3: f=relu(A_{i-1}); A_i=conv_i(f)+dense_i(f) (+A_{i-1} if widths are "
+    "equal, i.e. only i=2); widths 3,2,2,3; correction=A_3/128\", "
+    "\"out_scale\": [0.0078125, 0.0078125, 0.0078125]}";
+
+unsigned char *model_builder_cconv(const char *from, const char *to, size_t *size)
+{
+    static const struct {
+        const char *name;
+        int cells, in, out;
+    } terms[] = {{"conv0_fluid", 2, 4, 1}, {"conv0_obstacle", 2, 3, 1}, {"dense0_fluid", 0, 4, 1},
+                 {"conv1", 2, 3, 2},       {"conv2", 2, 2, 2},          {"conv3", 2, 2, 3},
+                 {"dense1", 0, 3, 2},      {"dense2", 0, 2, 2},         {"dense3", 0, 2, 3}};
+    model_builder builder;
+    uint64_t state = 2;
+    model_builder_open(&builder);
+    for (size_t i = 0; i < sizeof terms / sizeof *terms; i++)
+        add_weights(&builder, &state, terms[i].name, 3, terms[i].cells, terms[i].in, terms[i].out,
+                    1.0);
+    char floats[32];
+    snprintf(floats, sizeof floats, "%zu", builder.data.length / 4);
+    add_published(&builder, cconv_architecture, floats, from, to);
+    return model_builder_finish(&builder, size);
+}
+
+/* ---- Right tensors under another description ---------------------------------------------------- */
+
+static const model_random small = {
+    .levels = 2, .channels = 4, .cells = 2, .output_cells = 2, .neighbor_limit = 8};
+
+unsigned char *model_builder_described(char kind, const char *text, size_t *size)
+{
+    return kind == 'd'   ? model_builder_dmcf(dmcf_architecture, text, size)
+           : kind == 'c' ? model_builder_cconv(cconv_architecture, text, size)
+                         : random_file(&small, text, NULL, size);
+}
+
+char *model_builder_description(char kind)
+{
+    model_text text = {NULL, 0, 0};
+    size_t size;
+    if (kind != 'd' && kind != 'c') {
+        free(random_file(&small, NULL, &text.text, &size));
+        return text.text;
+    }
+    model_text_add(&text, "%s", kind == 'd' ? dmcf_architecture : cconv_architecture);
+    return text.text;
+}

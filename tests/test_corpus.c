@@ -1,0 +1,86 @@
+/* Replays the fuzzer's corpus: no input may crash, leak or break a promise.
+ * SPDX-License-Identifier: MIT */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+
+#include <cmocka.h>
+
+#include <dirent.h>
+
+#include "support/model_builder.h"
+
+#ifndef SOURCE_ROOT
+#define SOURCE_ROOT "."
+#endif
+
+int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
+
+static void replay(const char *path)
+{
+    static uint8_t data[1 << 20];
+    FILE *file = fopen(path, "rb");
+    assert_non_null(file);
+    const size_t size = fread(data, 1, sizeof data, file);
+    fclose(file);
+    uint8_t *exact = malloc(size ? size : 1); /* so that a sanitizer sees reads beyond the end */
+    assert_non_null(exact);
+    for (size_t i = 0; i < size; i++)
+        exact[i] = data[i];
+    LLVMFuzzerTestOneInput(exact, size);
+    free(exact);
+}
+
+static void every_input_of_the_corpus_is_survived(void **state)
+{
+    (void)state;
+    const char *folder = SOURCE_ROOT "/tests/fuzz/corpus";
+    DIR *listing = opendir(folder);
+    int count = 0;
+    assert_non_null(listing);
+    for (struct dirent *entry; (entry = readdir(listing)) != NULL;) {
+        char path[1024];
+        if (entry->d_name[0] == '.')
+            continue;
+        snprintf(path, sizeof path, "%s/%s", folder, entry->d_name);
+        replay(path);
+        count++;
+    }
+    closedir(listing);
+    assert_true(count >= 17);
+}
+
+static void every_changed_byte_of_a_file_is_survived(void **state)
+{
+    (void)state;
+    static const uint8_t changes[] = {0x00, 0xff, '"', '{', '9'};
+    const model_random tiny = {.channels = 4, .cells = 1, .output_cells = 2, .trunk_layers = 1};
+    size_t size;
+    unsigned char *file = model_builder_random(&tiny, &size);
+    uint8_t *input = malloc(size + 1);
+    assert_non_null(input);
+    input[0] = 'f';
+    for (size_t i = 0; i < size; i++)
+        input[i + 1] = file[i];
+    for (size_t i = 1; i <= size; i++)
+        for (size_t c = 0; c < sizeof changes; c++) {
+            const uint8_t kept = input[i];
+            input[i] = changes[c];
+            LLVMFuzzerTestOneInput(input, size + 1);
+            input[i] = kept;
+        }
+    free(input);
+    free(file);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(every_input_of_the_corpus_is_survived),
+        cmocka_unit_test(every_changed_byte_of_a_file_is_survived),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

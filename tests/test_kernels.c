@@ -1,0 +1,426 @@
+/* Kernels: every variant equals portable C bit for bit, and portable C equals plain doubles.
+ * SPDX-License-Identifier: MIT */
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include <ascc/ascc.h>
+
+#include "kernels/kernels.h"
+
+#define GUARD 0x7fc0dead /* a NaN no kernel makes */
+
+static uint64_t seed = 20261122;
+
+static uint32_t next(void)
+{
+    seed = seed * 6364136223846793005u + 1442695040888963407u;
+    return (uint32_t)(seed >> 33);
+}
+
+static float uniform(void)
+{
+    return (float)next() / 1073741824.0f - 1.0f;
+}
+
+/* The tables to compare: portable first, then each set of variants that this machine can run. */
+static int tables(ascc_kernels *table)
+{
+    const uint32_t available = ascc_kernels_available();
+    int count = 0;
+    ascc_kernels_select(&table[count++], 0);
+    for (uint32_t cpu = 1; cpu <= available; cpu++)
+        if ((cpu & available) == cpu)
+            ascc_kernels_select(&table[count++], cpu);
+    return count;
+}
+
+static float *floats(size_t count)
+{
+    float *p = aligned_alloc(64, (count * sizeof *p + 127) / 64 * 64);
+    assert_non_null(p);
+    for (size_t i = 0; i < count; i++)
+        p[i] = uniform();
+    return p;
+}
+
+static float *guarded(size_t count)
+{
+    float *p = floats(count + 8);
+    const uint32_t guard = GUARD;
+    for (size_t i = 0; i < count + 8; i++)
+        memcpy(p + i, &guard, sizeof guard);
+    return p;
+}
+
+static void check_guard(const float *p, size_t count)
+{
+    for (size_t i = count; i < count + 8; i++) {
+        uint32_t bits;
+        memcpy(&bits, p + i, sizeof bits);
+        assert_int_equal(bits, GUARD);
+    }
+}
+
+static void check_same_bits(const float *a, const float *b, size_t count, const char *what)
+{
+    for (size_t i = 0; i < count; i++)
+        if (memcmp(a + i, b + i, sizeof *a) != 0)
+            fail_msg("%s: index %zu: %.9g and %.9g", what, i, (double)a[i], (double)b[i]);
+}
+
+/* ---- search ---- */
+
+static void search_finds_the_points_within_the_limit_on_every_cpu(void **state)
+{
+    (void)state;
+    ascc_kernels table[16];
+    const int count = tables(table);
+    for (size_t n = 0; n < 70; n++) {
+        int32_t x[72], y[72], z[72];
+        for (size_t i = 0; i < n; i++) {
+            x[i] = (int32_t)(next() << 1) / 64;
+            y[i] = (int32_t)(next() << 1) / 64;
+            z[i] = n % 3 ? (int32_t)(next() << 1) / 64 : 0;
+        }
+        const ascc_coordinates points = {x, y, z};
+        const float limit = 4e14f;
+        const int32_t q[3] = {n ? x[0] : 5, -7000000, 300};
+        for (int t = 0; t < count; t++) {
+            uint32_t found[100];
+            const size_t begin = n / 5;
+            const size_t got = table[t].search(&points, begin, n, q[0], q[1], q[2], limit, found);
+            size_t k = 0;
+            for (size_t i = begin; i < n; i++) {
+                const double dx = (double)x[i] - q[0], dy = (double)y[i] - q[1],
+                             dz = (double)z[i] - q[2];
+                const double square = dx * dx + dy * dy + dz * dz;
+                if (fabs(square / (double)limit - 1.0) < 1e-6)
+                    continue;
+                const int inside = square < (double)limit;
+                assert_int_equal(inside, k < got && found[k] == i);
+                k += (size_t)inside;
+            }
+            assert_int_equal(k, got);
+        }
+    }
+}
+
+static void search_sees_across_the_wrap_of_the_low_words(void **state)
+{
+    (void)state;
+    ascc_kernels table[16];
+    const int count = tables(table);
+    int32_t x[1] = {INT32_MIN + 10}, zero[1] = {0};
+    const ascc_coordinates points = {x, zero, zero};
+    for (int t = 0; t < count; t++) {
+        uint32_t found[20];
+        assert_int_equal(table[t].search(&points, 0, 1, INT32_MAX - 10, 0, 0, 21.5f * 21.5f, found),
+                         1);
+        assert_int_equal(table[t].search(&points, 0, 1, INT32_MAX - 10, 0, 0, 20.5f * 20.5f, found),
+                         0);
+    }
+}
+
+/* ---- geometry ---- */
+
+typedef struct pair_arrays {
+    float *x, *y, *z, *poly6, *peak;
+} pair_arrays;
+
+static pair_arrays take_pairs(size_t k)
+{
+    const pair_arrays p = {guarded(k), guarded(k), guarded(k), guarded(k), guarded(k)};
+    return p;
+}
+
+static ascc_pairs as_pairs(const pair_arrays *p)
+{
+    const ascc_pairs pairs = {p->x, p->y, p->z, {NULL, p->poly6, p->peak}};
+    return pairs;
+}
+
+static void drop_pairs(pair_arrays *p)
+{
+    free(p->x);
+    free(p->y);
+    free(p->z);
+    free(p->poly6);
+    free(p->peak);
+}
+
+static void geometry_has_the_same_bits_on_every_cpu(void **state)
+{
+    (void)state;
+    ascc_kernels table[16];
+    const int count = tables(table);
+    int32_t x[64], y[64], z[64];
+    for (size_t i = 0; i < 64; i++) {
+        x[i] = (int32_t)(next() << 1) / 64;
+        y[i] = (int32_t)(next() << 1) / 64;
+        z[i] = (int32_t)(next() << 1) / 64;
+    }
+    x[3] = y[3] = z[3] = 0; /* the centre, an axis, a diagonal */
+    x[4] = y[4] = 0;
+    x[5] = y[5] = z[5] = 1 << 20;
+    const ascc_coordinates points = {x, y, z};
+    for (int mapping = 0; mapping < 3; mapping++)
+        for (size_t k = 0; k < 40; k++) {
+            uint32_t neighbor[40];
+            for (size_t i = 0; i < k; i++)
+                neighbor[i] = (uint32_t)(i < 3 ? i + 3 : next() % 64);
+            pair_arrays want = take_pairs(k);
+            const ascc_pairs a = as_pairs(&want);
+            table[0].geometry(&points, neighbor, k, 0, 0, 0, 1.0f / 33554432.0f, mapping, &a);
+            for (int t = 1; t < count; t++) {
+                pair_arrays got = take_pairs(k);
+                const ascc_pairs b = as_pairs(&got);
+                table[t].geometry(&points, neighbor, k, 0, 0, 0, 1.0f / 33554432.0f, mapping, &b);
+                check_same_bits(want.x, got.x, k + 8, "x");
+                check_same_bits(want.y, got.y, k + 8, "y");
+                check_same_bits(want.z, got.z, k + 8, "z");
+                check_same_bits(want.poly6, got.poly6, k + 8, "poly6");
+                check_same_bits(want.peak, got.peak, k + 8, "peak");
+                drop_pairs(&got);
+            }
+            check_guard(want.x, k);
+            drop_pairs(&want);
+        }
+}
+
+static void geometry_of_opposite_displacements_is_opposite(void **state)
+{
+    (void)state;
+    ascc_kernels kernels;
+    ascc_kernels_select(&kernels, ascc_kernels_available());
+    for (int i = 0; i < 2000; i++) {
+        int32_t at[3] = {(int32_t)(next() << 1) / 64, (int32_t)(next() << 1) / 64,
+                         (int32_t)(next() << 1) / 64};
+        int32_t x[2] = {at[0], -at[0]}, y[2] = {at[1], -at[1]}, z[2] = {at[2], -at[2]};
+        const ascc_coordinates points = {x, y, z};
+        const uint32_t neighbor[2] = {0, 1};
+        pair_arrays p = take_pairs(2);
+        const ascc_pairs pairs = as_pairs(&p);
+        kernels.geometry(&points, neighbor, 2, 0, 0, 0, 1.0f / 67108864.0f, 2, &pairs);
+        assert_true(p.x[0] == -p.x[1] && p.y[0] == -p.y[1] && p.z[0] == -p.z[1]);
+        assert_true(p.poly6[0] == p.poly6[1] && p.peak[0] == p.peak[1]);
+        drop_pairs(&p);
+    }
+}
+
+static void the_volume_map_fills_the_cube_and_stays_inside(void **state)
+{
+    (void)state;
+    ascc_kernels kernels;
+    ascc_kernels_select(&kernels, 0);
+    double largest = 0.0;
+    for (int i = 0; i < 3000; i++) {
+        double d[3], square = 0.0;
+        for (int c = 0; c < 3; c++) {
+            d[c] = (double)uniform();
+            square += d[c] * d[c];
+        }
+        int32_t x[1], y[1], z[1];
+        const double scale = 33554432.0 / sqrt(square);
+        x[0] = (int32_t)(d[0] * scale);
+        y[0] = (int32_t)(d[1] * scale);
+        z[0] = (int32_t)(d[2] * scale);
+        const ascc_coordinates points = {x, y, z};
+        const uint32_t neighbor[1] = {0};
+        pair_arrays p = take_pairs(1);
+        const ascc_pairs pairs = as_pairs(&p);
+        kernels.geometry(&points, neighbor, 1, 0, 0, 0, 1.0f / 33554432.0f, 2, &pairs);
+        const double m =
+            fmax(fabs((double)p.x[0]), fmax(fabs((double)p.y[0]), fabs((double)p.z[0])));
+        /* A point of the sphere lands on the cube's surface. */
+        assert_true(fabs(m - 1.0) < 2e-6);
+        largest = fmax(largest, m);
+        drop_pairs(&p);
+    }
+    assert_true(largest > 0.999999);
+}
+
+/* ---- gather, multiply, pair terms ---- */
+
+typedef struct gather_case {
+    size_t k, a;
+    int32_t cells[3];
+    pair_arrays pairs;
+    uint32_t neighbor[80];
+    float *feature;
+} gather_case;
+
+static gather_case random_gather(size_t k, size_t a, const int32_t cells[3])
+{
+    gather_case c = {.k = k, .a = a, .cells = {cells[0], cells[1], cells[2]}};
+    c.pairs =
+        (pair_arrays){floats(k + 8), floats(k + 8), floats(k + 8), floats(k + 8), floats(k + 8)};
+    c.feature = floats(50 * a);
+    for (size_t i = 0; i < k; i++)
+        c.neighbor[i] = next() % 50;
+    if (k > 3) { /* corners of the cube and its centre */
+        c.pairs.x[0] = c.pairs.y[0] = c.pairs.z[0] = 1.0f;
+        c.pairs.x[1] = c.pairs.y[1] = c.pairs.z[1] = -1.0f;
+        c.pairs.x[2] = c.pairs.y[2] = c.pairs.z[2] = 0.0f;
+    }
+    return c;
+}
+
+static void drop_gather(gather_case *c)
+{
+    drop_pairs(&c->pairs);
+    free(c->feature);
+}
+
+/* Trilinear weight of a cell in doubles, straight from the definition. */
+static double weight_of(const float at[3], const int32_t cells[3], size_t cell)
+{
+    const size_t i[3] = {cell % (size_t)cells[0], cell / (size_t)cells[0] % (size_t)cells[1],
+                         cell / ((size_t)cells[0] * (size_t)cells[1])};
+    double w = 1.0;
+    for (int c = 0; c < 3; c++) {
+        const double coordinate = ((double)at[c] / 2.0 + 0.5) * (cells[c] - 1);
+        w *= fmax(0.0, 1.0 - fabs(coordinate - (double)i[c]));
+    }
+    return w;
+}
+
+static const int32_t shapes[][3] = {{4, 4, 4}, {6, 6, 6}, {3, 4, 5},
+                                    {8, 8, 1}, {1, 1, 1}, {2, 1, 3}};
+
+static void gather_equals_doubles_and_has_the_same_bits_on_every_cpu(void **state)
+{
+    (void)state;
+    ascc_kernels table[16];
+    const int count = tables(table);
+    for (size_t s = 0; s < sizeof shapes / sizeof *shapes; s++)
+        for (size_t a = 8; a <= 48; a += 8)
+            for (size_t k = 0; k < 21; k += 1 + k / 3) {
+                gather_case c = random_gather(k, a, shapes[s]);
+                const size_t cells = (size_t)(shapes[s][0] * shapes[s][1] * shapes[s][2]);
+                const ascc_pairs pairs = as_pairs(&c.pairs);
+                float *want = guarded(cells * a);
+                table[0].gather(&pairs, c.pairs.poly6, c.neighbor, k, c.feature, a, c.cells, want);
+                check_guard(want, cells * a);
+                for (size_t cell = 0; cell < cells; cell++)
+                    for (size_t j = 0; j < a; j++) {
+                        double sum = 0.0;
+                        for (size_t i = 0; i < k; i++) {
+                            const float at[3] = {c.pairs.x[i], c.pairs.y[i], c.pairs.z[i]};
+                            sum += (double)c.pairs.poly6[i] * weight_of(at, c.cells, cell) *
+                                   (double)c.feature[c.neighbor[i] * a + j];
+                        }
+                        assert_true(fabs(sum - (double)want[cell * a + j]) <
+                                    1e-6 * (1.0 + (double)k));
+                    }
+                for (int t = 1; t < count; t++) {
+                    float *got = guarded(cells * a);
+                    table[t].gather(&pairs, c.pairs.poly6, c.neighbor, k, c.feature, a, c.cells,
+                                    got);
+                    check_same_bits(want, got, cells * a + 8, "column");
+                    free(got);
+                }
+                free(want);
+                drop_gather(&c);
+            }
+}
+
+static void multiply_equals_doubles_and_has_the_same_bits_on_every_cpu(void **state)
+{
+    (void)state;
+    ascc_kernels table[16];
+    const int count = tables(table);
+    for (size_t n = 0; n <= 17; n++)
+        for (size_t b = 8; b <= 40; b += 8)
+            for (size_t a = 0; a <= 72; a += 24) {
+                const size_t stride = a + 3, out_stride = b + 5;
+                float *in = floats(n * stride + 1), *weight = floats(a * b + 1);
+                float *begin = floats(n * out_stride + 8), *want = guarded(n * out_stride);
+                memcpy(want, begin, n * out_stride * sizeof *want);
+                table[0].multiply(in, stride, n, a, weight, b, want, out_stride);
+                check_guard(want, n * out_stride);
+                for (size_t r = 0; r < n; r++)
+                    for (size_t o = 0; o < out_stride; o++) {
+                        double sum = (double)begin[r * out_stride + o];
+                        for (size_t i = 0; o < b && i < a; i++)
+                            sum += (double)in[r * stride + i] * (double)weight[i * b + o];
+                        assert_true(fabs(sum - (double)want[r * out_stride + o]) < 1e-5);
+                    }
+                for (int t = 1; t < count; t++) {
+                    float *got = guarded(n * out_stride);
+                    memcpy(got, begin, n * out_stride * sizeof *got);
+                    table[t].multiply(in, stride, n, a, weight, b, got, out_stride);
+                    check_same_bits(want, got, n * out_stride + 8, "product");
+                    free(got);
+                }
+                free(in);
+                free(weight);
+                free(begin);
+                free(want);
+            }
+}
+
+static void pair_terms_equal_doubles_and_have_the_same_bits_on_every_cpu(void **state)
+{
+    (void)state;
+    ascc_kernels table[16];
+    const int count = tables(table);
+    for (size_t s = 0; s < sizeof shapes / sizeof *shapes; s++)
+        for (size_t b = 1; b <= 3; b++)
+            for (size_t k = 0; k < 20; k += 3) {
+                const size_t a = 16, cells = (size_t)(shapes[s][0] * shapes[s][1] * shapes[s][2]);
+                gather_case c = random_gather(k, a, shapes[s]);
+                const ascc_pairs pairs = as_pairs(&c.pairs);
+                float *center = floats(a), *weight = floats(cells * a * b);
+                float *want = guarded(k * 4);
+                table[0].pair_terms(&pairs, c.pairs.peak, c.neighbor, k, center, c.feature, a,
+                                    c.cells, weight, b, want);
+                check_guard(want, k * 4);
+                for (size_t i = 0; i < k; i++)
+                    for (size_t o = 0; o < b; o++) {
+                        const float at[3] = {c.pairs.x[i], c.pairs.y[i], c.pairs.z[i]};
+                        double sum = 0.0;
+                        for (size_t cell = 0; cell < cells; cell++)
+                            for (size_t j = 0; j < a; j++)
+                                sum +=
+                                    weight_of(at, c.cells, cell) *
+                                    ((double)center[j] + (double)c.feature[c.neighbor[i] * a + j]) *
+                                    (double)weight[(cell * b + o) * a + j];
+                        sum *= (double)c.pairs.peak[i];
+                        assert_true(fabs(sum - (double)want[i * 4 + o]) < 1e-5);
+                    }
+                for (int t = 1; t < count; t++) {
+                    float *got = guarded(k * 4);
+                    table[t].pair_terms(&pairs, c.pairs.peak, c.neighbor, k, center, c.feature, a,
+                                        c.cells, weight, b, got);
+                    check_same_bits(want, got, k * 4 + 8, "pair terms");
+                    free(got);
+                }
+                free(center);
+                free(weight);
+                free(want);
+                drop_gather(&c);
+            }
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(search_finds_the_points_within_the_limit_on_every_cpu),
+        cmocka_unit_test(search_sees_across_the_wrap_of_the_low_words),
+        cmocka_unit_test(geometry_has_the_same_bits_on_every_cpu),
+        cmocka_unit_test(geometry_of_opposite_displacements_is_opposite),
+        cmocka_unit_test(the_volume_map_fills_the_cube_and_stays_inside),
+        cmocka_unit_test(gather_equals_doubles_and_has_the_same_bits_on_every_cpu),
+        cmocka_unit_test(multiply_equals_doubles_and_has_the_same_bits_on_every_cpu),
+        cmocka_unit_test(pair_terms_equal_doubles_and_have_the_same_bits_on_every_cpu),
+    };
+    return cmocka_run_group_tests_name("kernels", tests, NULL, NULL);
+}

@@ -1,0 +1,1066 @@
+/* Models: what loads, what the plan then says, and that every wrong file is refused by name.
+ * SPDX-License-Identifier: MIT */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include <math.h>
+
+#include "model.h"
+#include "support/failing_allocator.h"
+#include "support/model_builder.h"
+
+#ifndef SOURCE_ROOT
+#define SOURCE_ROOT "."
+#endif
+
+static ascc_context *context;
+static char text[512];
+
+static int open_context(void **state)
+{
+    (void)state;
+    return ascc_context_create(NULL, &context) == ASCC_OK ? 0 : -1;
+}
+
+static int close_context(void **state)
+{
+    (void)state;
+    ascc_context_destroy(&context);
+    return 0;
+}
+
+/* Loads bytes from malloc and frees them. */
+static ascc_status load(unsigned char *bytes, size_t size, ascc_model **model)
+{
+    const ascc_status status = ascc_model_load_memory(context, bytes, size, model);
+    ascc_context_message(context, text, sizeof text);
+    free(bytes);
+    return status;
+}
+
+static ascc_model *must_load(unsigned char *bytes, size_t size)
+{
+    ascc_model *model = NULL;
+    if (load(bytes, size, &model) != ASCC_OK)
+        fail_msg("%s", text);
+    return model;
+}
+
+/* Refused with a message that contains `hint`; `what` says which case it is. */
+static void must_refuse(const char *what, unsigned char *bytes, size_t size, const char *hint)
+{
+    ascc_model *model = NULL;
+    const ascc_status status = load(bytes, size, &model);
+    if (status != ASCC_ERROR_FORMAT || !strstr(text, hint))
+        fail_msg("%s: status %d, message '%s' without '%s'", what, (int)status, text, hint);
+    assert_null(model);
+}
+
+static void must_have(const ascc_model *model, const float *weights, size_t count)
+{
+    const uintptr_t begin = (uintptr_t)model->weights;
+    assert_true((uintptr_t)weights >= begin);
+    assert_true((uintptr_t)(weights + count) <= begin + model->weight_count * sizeof(float));
+    assert_int_equal((uintptr_t)weights % ASCC_ALIGNMENT, 0);
+}
+
+/* Everything the solver relies on, for any plan. */
+static void check_plan(const ascc_model *model)
+{
+    const ascc_plan *plan = &model->plan;
+    for (int32_t i = 0; i < plan->layer_count; i++) {
+        const ascc_layer *layer = &plan->layer[i];
+        assert_in_range(layer->set, 0, ASCC_SET_LEVEL + plan->level_count - 2);
+        assert_true(layer->term_count > 0);
+        for (int32_t t = layer->first_term; t < layer->first_term + layer->term_count; t++) {
+            const ascc_term *term = &plan->term[t];
+            const int32_t *cells = term->filter.cells;
+            assert_in_range(term->source, 0, i + 1);
+            assert_true(term->column + term->outputs <= layer->channels);
+            if (term->kind == ASCC_TERM_CONVOLUTION)
+                must_have(model, term->weight,
+                          (size_t)(cells[0] * cells[1] * cells[2] * term->inputs * term->outputs));
+            else if (term->kind == ASCC_TERM_DENSE)
+                must_have(model, term->weight, (size_t)(term->inputs * term->outputs));
+            else
+                assert_null(term->weight);
+            if (term->bias)
+                must_have(model, term->bias, (size_t)term->outputs);
+        }
+    }
+    const ascc_output *output = &plan->output;
+    if (output->kind != ASCC_OUTPUT_ANTISYMMETRIC)
+        return;
+    const size_t cells =
+        (size_t)(output->filter.cells[0] * output->filter.cells[1] * output->filter.cells[2]);
+    const size_t values = (size_t)(output->inputs * plan->dimension);
+    must_have(model, output->weight, cells * values);
+    for (size_t c = 0; c < cells; c++)
+        for (size_t v = 0; v < values; v++)
+            assert_true(output->weight[c * values + v] ==
+                        -output->weight[(cells - 1 - c) * values + v]);
+}
+
+/* ---- What loads --------------------------------------------------------------------------------- */
+
+static void random_models_of_all_shapes_load(void **state)
+{
+    (void)state;
+    for (int i = 0; i < 2 * 3 * 2 * 2 * 2; i++) {
+        const model_random options = {.seed = (uint64_t)i,
+                                      .dimension = 2 + i % 2,
+                                      .levels = 1 + i / 2 % 3,
+                                      .plain = i / 6 % 2,
+                                      .fluid_only = i / 12 % 2,
+                                      .half_axis = i / 24 % 2 ? "y" : NULL,
+                                      .method = i % 3 == 0   ? "voxel_centers"
+                                                : i % 3 == 1 ? "voxel_corners"
+                                                             : "farthest",
+                                      .boundary_crop = i % 5};
+        size_t size;
+        unsigned char *bytes = model_builder_random(&options, &size);
+        ascc_model *model = must_load(bytes, size);
+        check_plan(model);
+        ascc_model_info info = {.size = sizeof info};
+        assert_int_equal(ascc_model_get_info(model, &info), ASCC_OK);
+        assert_int_equal(info.dimension, options.dimension);
+        assert_int_equal(info.level_count, options.levels);
+        assert_int_equal(info.conserves_momentum, !options.plain);
+        assert_int_equal(info.conserves_angular_momentum, !options.plain);
+        assert_int_equal(info.advected, 0);
+        assert_string_equal(info.name, "random");
+        ascc_model_destroy(&model);
+        assert_null(model);
+    }
+}
+
+static void demonstration_models_are_antisymmetric_and_radial(void **state)
+{
+    (void)state;
+    static const double spacings[] = {1e-3, 0.0125, 0.05, 1.0, 30.0};
+    for (int dimension = 2; dimension <= 3; dimension++)
+        for (size_t i = 0; i < sizeof spacings / sizeof *spacings; i++) {
+            size_t size;
+            unsigned char *bytes = model_builder_demo(dimension, spacings[i], &size);
+            ascc_model *model = must_load(bytes, size);
+            check_plan(model);
+            ascc_model_info info = {.size = sizeof info};
+            assert_int_equal(ascc_model_get_info(model, &info), ASCC_OK);
+            assert_int_equal(info.conserves_momentum, 1);
+            assert_int_equal(info.advected, 1);
+            /* Central impulses at advected positions: torque about those, not about the current. */
+            assert_int_equal(model->plan.output.radial, 1);
+            assert_int_equal(info.conserves_angular_momentum, 0);
+            assert_true(fabs(info.particle_spacing / spacings[i] - 1.0) < 1e-8);
+            assert_true(fabs(info.support_radius / spacings[i] - 2.0) < 1e-8);
+            assert_non_null(strstr(info.description, "not trained"));
+            ascc_model_destroy(&model);
+        }
+    size_t size;
+    assert_null(model_builder_demo(4, 0.05, &size));
+    assert_null(model_builder_demo(2, 0.0, &size));
+}
+
+/* Half along `axis`, written out as SEMANTICS section 3 does for y. */
+static void halves_are_mirrored_along_each_axis(void **state)
+{
+    (void)state;
+    for (int axis = 0; axis < 3; axis++) {
+        static const char *const names[] = {"x", "y", "z"};
+        const model_random options = {
+            .dimension = 3, .half_axis = names[axis], .output_cells = 4, .channels = 4, .seed = 3};
+        size_t size;
+        unsigned char *bytes = model_builder_random(&options, &size);
+        const size_t values = 4 * 3, stored_size = 4 * 4 * 2 * values;
+        float *half = calloc(stored_size, sizeof *half);
+        assert_non_null(half);
+        memcpy(half, bytes + size - stored_size * sizeof *half, stored_size * sizeof *half);
+        ascc_model *model = must_load(bytes, size);
+        const float *full = model->plan.output.weight;
+        int shape[3] = {4, 4, 4}; /* x, y, z */
+        shape[axis] = 2;
+        for (int z = 0; z < 4; z++)
+            for (int y = 0; y < 4; y++)
+                for (int x = 0; x < 4; x++) {
+                    int at[3] = {x, y, z};
+                    const int upper = at[axis] >= 2;
+                    if (!upper)
+                        for (int a = 0; a < 3; a++)
+                            at[a] = 3 - at[a];
+                    at[axis] -= 2;
+                    const int cell = (at[2] * shape[1] + at[1]) * shape[0] + at[0];
+                    for (size_t v = 0; v < values; v++) {
+                        const float stored = half[(size_t)cell * values + v];
+                        const float got = full[(size_t)((z * 4 + y) * 4 + x) * values + v];
+                        assert_true(got == (upper ? stored : -stored));
+                    }
+                }
+        check_plan(model);
+        free(half);
+        ascc_model_destroy(&model);
+    }
+}
+
+static void plan_says_what_the_file_says(void **state)
+{
+    (void)state;
+    const model_random options = {.dimension = 2,
+                                  .levels = 3,
+                                  .channels = 8,
+                                  .spacing = 0.5,
+                                  .method = "voxel_corners",
+                                  .anchor = "centroid",
+                                  .evaluate = "advected_mean",
+                                  .projection = "none",
+                                  .window = "none",
+                                  .mapping = "radial",
+                                  .neighbor_limit = 64,
+                                  .skip_self = 1,
+                                  .boundary_crop = 16.0};
+    size_t size;
+    unsigned char *bytes = model_builder_random(&options, &size);
+    ascc_model *model = must_load(bytes, size);
+    const ascc_plan *plan = &model->plan;
+    assert_int_equal(plan->advection, ASCC_ADVECT_MEAN);
+    assert_true(plan->time_step == 0.005 && plan->gravity[1] == -9.8125);
+    assert_true(plan->spacing == 0.5 && plan->rest_density == 1000.0);
+    assert_true(plan->boundary_crop == 8.0 && plan->hysteresis == 0.1);
+    assert_int_equal(plan->fluid_feature_count, 2);
+    assert_int_equal(plan->fluid_features[1], ASCC_FEATURE_VELOCITY);
+    assert_int_equal(plan->boundary_features[1], ASCC_FEATURE_NORMAL);
+    assert_int_equal(plan->fluid_channels, 3);
+    assert_int_equal(plan->boundary_channels, 3);
+    assert_int_equal(plan->level_count, 3);
+    assert_true(plan->level[1].voxel == 1.0 && plan->level[2].voxel == 2.0);
+    assert_int_equal(plan->sampling, ASCC_SAMPLING_CORNERS);
+    assert_int_equal(plan->centroid_anchor, 1);
+    assert_int_equal(plan->layer_count, 5); /* l0; l1 on three levels; l2 on the particles */
+    assert_string_equal(plan->layer[2].name, "l1.1");
+    assert_int_equal(plan->layer[0].set, ASCC_SET_ALL);
+    assert_int_equal(plan->layer[2].set, ASCC_SET_LEVEL);
+    assert_int_equal(plan->layer[3].set, ASCC_SET_LEVEL + 1);
+
+    const ascc_term *term = &plan->term[plan->layer[0].first_term + 1];
+    assert_int_equal(term->kind, ASCC_TERM_CONVOLUTION);
+    assert_int_equal(term->source, 1);
+    assert_int_equal(term->rectify, 0);
+    assert_int_equal(term->column, 2);
+    assert_int_equal(term->inputs, 3);
+    assert_int_equal(term->outputs, 2);
+    assert_int_equal(term->filter.cells[0], 4);
+    assert_int_equal(term->filter.cells[2], 1);
+    assert_int_equal(term->filter.neighbor_limit, 64);
+    assert_int_equal(term->filter.window, ASCC_WINDOW_NONE);
+    assert_int_equal(term->filter.mapping, ASCC_MAPPING_RADIAL);
+    assert_int_equal(term->filter.skip_self, 1);
+    assert_true(term->filter.radius == 1.0);
+    term = &plan->term[plan->layer[4].first_term + 2]; /* level 2 to the particles */
+    assert_int_equal(term->source, 5);
+    assert_int_equal(term->rectify, 1);
+    assert_true(term->filter.radius == 4.0);
+    assert_int_equal(plan->term[plan->layer[4].first_term + 4].kind, ASCC_TERM_IDENTITY);
+    assert_int_equal(plan->output.kind, ASCC_OUTPUT_ANTISYMMETRIC);
+    assert_int_equal(plan->output.source, 6);
+    assert_int_equal(plan->output.rectify, 1);
+    assert_int_equal(plan->output.radial, 0);
+    assert_int_equal(plan->output.inputs, 8);
+    assert_int_equal(plan->output.filter.window, ASCC_WINDOW_PEAK);
+    assert_int_equal(plan->output.filter.skip_self, 1);
+    assert_true(plan->output.scale[0] == 0.005 && plan->output.scale[1] == 0.005 &&
+                plan->output.scale[2] == 0.0);
+
+    ascc_model_info info = {.size = sizeof info};
+    assert_int_equal(ascc_model_get_info(model, &info), ASCC_OK);
+    assert_int_equal(info.layer_count, 6);
+    assert_int_equal(info.neighbor_limit, 64);
+    assert_int_equal(info.conserves_momentum, 1);
+    assert_int_equal(info.conserves_angular_momentum, 0);
+    assert_true(info.support_radius == 1.0);
+    /* Last layer 1, from level 2 4, to level 2 4, first layer 1: farther than what put the point
+     * there, 2.2 sqrt 2. */
+    assert_true(info.receptive_radius == 10.0);
+    ascc_model_destroy(&model);
+}
+
+/* ---- Handles ------------------------------------------------------------------------------------ */
+
+static void saved_again_is_byte_identical(void **state)
+{
+    (void)state;
+    size_t size, kept_size, again_size;
+    char path[] = "test_model_save_XXXXXX";
+    unsigned char *bytes = model_builder_random(&(model_random){.levels = 2}, &size);
+    unsigned char *copy = malloc(size);
+    assert_non_null(copy);
+    memcpy(copy, bytes, size);
+    ascc_model *model = must_load(bytes, size), *again = NULL;
+    const void *kept = ascc_model_bytes(model, &kept_size);
+    assert_int_equal(kept_size, size);
+    assert_memory_equal(kept, copy, size);
+    const int file = mkstemp(path);
+    assert_true(file >= 0);
+    assert_int_equal(ascc_model_save(model, path), ASCC_OK);
+    assert_int_equal(ascc_model_load(context, path, &again), ASCC_OK);
+    assert_memory_equal(ascc_model_bytes(again, &again_size), copy, size);
+    assert_int_equal(again_size, size);
+    remove(path);
+    ascc_model_destroy(&again);
+    ascc_model_destroy(&model);
+    free(copy);
+}
+
+static void arguments_and_paths_are_checked(void **state)
+{
+    (void)state;
+    size_t size = 1;
+    ascc_model *model = (ascc_model *)&size;
+    assert_int_equal(ascc_model_load(NULL, "x", &model), ASCC_ERROR_ARGUMENT);
+    assert_null(model);
+    assert_int_equal(ascc_model_load(context, NULL, &model), ASCC_ERROR_ARGUMENT);
+    assert_int_equal(ascc_model_load(context, "x", NULL), ASCC_ERROR_ARGUMENT);
+    assert_int_equal(ascc_model_load_memory(context, NULL, 0, &model), ASCC_ERROR_ARGUMENT);
+    assert_int_equal(ascc_model_load_memory(NULL, "x", 1, &model), ASCC_ERROR_ARGUMENT);
+    assert_int_equal(ascc_model_load(context, "no/such/file", &model), ASCC_ERROR_FILE);
+    ascc_context_message(context, text, sizeof text);
+    assert_non_null(strstr(text, "no/such/file"));
+    assert_int_equal(ascc_model_load(context, ".", &model), ASCC_ERROR_FILE);
+    assert_int_equal(ascc_model_load_memory(context, "", 0, &model), ASCC_ERROR_FORMAT);
+    assert_null(model);
+    ascc_model_destroy(NULL);
+    ascc_model_destroy(&model);
+    assert_int_equal(ascc_model_save(NULL, "x"), ASCC_ERROR_ARGUMENT);
+    assert_null(ascc_model_bytes(NULL, &size));
+    assert_int_equal(size, 0);
+
+    unsigned char *bytes = model_builder_random(&(model_random){.dimension = 2}, &size);
+    model = must_load(bytes, size);
+    assert_int_equal(ascc_model_save(model, NULL), ASCC_ERROR_ARGUMENT);
+    assert_int_equal(ascc_model_save(model, "no/such/folder/file"), ASCC_ERROR_FILE);
+    ascc_model_info info = {.size = sizeof info - 8};
+    assert_int_equal(ascc_model_get_info(model, &info), ASCC_ERROR_ARGUMENT);
+    assert_int_equal(ascc_model_get_info(model, NULL), ASCC_ERROR_ARGUMENT);
+    assert_int_equal(ascc_model_get_info(NULL, &info), ASCC_ERROR_ARGUMENT);
+    ascc_model_destroy(&model);
+}
+
+static void model_outlives_its_context(void **state)
+{
+    (void)state;
+    ascc_context *own = NULL;
+    ascc_model *model = NULL;
+    size_t size;
+    unsigned char *bytes = model_builder_random(&(model_random){.dimension = 3}, &size);
+    assert_int_equal(ascc_context_create(NULL, &own), ASCC_OK);
+    assert_int_equal(ascc_model_load_memory(own, bytes, size, &model), ASCC_OK);
+    memset(bytes, 0, size);
+    free(bytes);
+    ascc_context_destroy(&own);
+    ascc_model *held = model;
+    ascc_model_retain(held);
+    ascc_model_destroy(&model);
+    ascc_model_info info = {.size = sizeof info};
+    assert_int_equal(ascc_model_get_info(held, &info), ASCC_OK);
+    check_plan(held);
+    ascc_model_release(held);
+}
+
+/* ---- What is refused ---------------------------------------------------------------------------- */
+
+static const char base_network[] =
+    "{\"name\":\"n\",\"description\":\"d\",\"dimension\":2,\"time_step\":0.01,"
+    "\"gravity\":[0,-9.81],\"particle_spacing\":0.05,\"rest_density\":1000,"
+    "\"evaluate\":\"current\",\"boundary_crop\":0.5,"
+    "\"features\":{\"fluid\":[\"one\",\"velocity\"],\"boundary\":[\"one\",\"normal\"]},"
+    "\"levels\":[{\"voxel\":0.1}],\"sampling\":{\"method\":\"voxel_corners\","
+    "\"anchor\":\"world\",\"hysteresis\":0.1},"
+    "\"layers\":[{\"name\":\"a\",\"points\":\"all\",\"channels\":5,\"terms\":["
+    "{\"type\":\"convolution\",\"source\":\"fluid\",\"kernel\":\"k\",\"bias\":\"kb\","
+    "\"radius\":0.1,\"window\":\"poly6\",\"mapping\":\"volume\"},"
+    "{\"type\":\"dense\",\"source\":\"boundary\",\"column\":2,\"weight\":\"w\"},"
+    "{\"type\":\"identity\",\"source\":\"fluid\",\"column\":2,\"relu\":true}]},"
+    "{\"name\":\"b\",\"points\":\"level1\",\"channels\":2,\"terms\":["
+    "{\"type\":\"convolution\",\"source\":\"a\",\"relu\":true,\"kernel\":\"k2\","
+    "\"radius\":0.2,\"window\":\"none\",\"mapping\":\"identity\",\"skip_self\":false,"
+    "\"neighbor_limit\":9}]}],"
+    "\"output\":{\"type\":\"antisymmetric\",\"source\":\"a\",\"kernel\":\"o\","
+    "\"stored\":\"full\",\"radius\":0.1,\"window\":\"peak\",\"mapping\":\"volume\","
+    "\"projection\":\"radial\",\"scale\":[0.01,0.02]}}";
+
+/* Values 1, 2, 3 ...; the output kernel's second half is the negated mirror of its first. */
+static void add_tensor(model_builder *builder, const char *name, int rank, const size_t *shape,
+                       int antisymmetric)
+{
+    float values[1024];
+    size_t count = 1;
+    for (int i = 0; i < rank; i++)
+        count *= shape[i];
+    assert_true(count <= 1024);
+    const size_t width = shape[rank - 1] * (rank > 1 ? shape[rank - 2] : 1);
+    for (size_t i = 0; i < count; i++) {
+        values[i] = (float)(i + 1);
+        const size_t cell = i / width, cells = count / width;
+        if (antisymmetric && cell >= cells / 2)
+            values[i] = -values[(cells - 1 - cell) * width + i % width];
+    }
+    model_builder_tensor(builder, name, rank, shape, values);
+}
+
+/* The base file with the tensor `wrong` replaced by one of this shape (rank 0: left out). */
+static unsigned char *build(const char *network, const char *wrong, int rank, const size_t *shape,
+                            size_t *size)
+{
+    static const struct {
+        const char *name;
+        int rank;
+        size_t shape[5];
+    } tensors[] = {{"k", 5, {1, 3, 3, 3, 2}},
+                   {"kb", 1, {2}},
+                   {"w", 2, {3, 3}},
+                   {"k2", 5, {1, 2, 2, 5, 2}},
+                   {"o", 5, {1, 4, 4, 5, 2}}};
+    model_builder builder;
+    model_builder_open(&builder);
+    model_builder_metadata(&builder, "format", "ascc.model");
+    model_builder_metadata(&builder, "version", "1");
+    model_builder_metadata(&builder, "network", network);
+    for (size_t i = 0; i < sizeof tensors / sizeof *tensors; i++) {
+        const int replaced = wrong && strcmp(wrong, tensors[i].name) == 0;
+        if (!replaced)
+            add_tensor(&builder, tensors[i].name, tensors[i].rank, tensors[i].shape,
+                       tensors[i].name[0] == 'o');
+        else if (rank > 0)
+            add_tensor(&builder, wrong, rank, shape, 0);
+    }
+    return model_builder_finish(&builder, size);
+}
+
+static char *replaced(const char *whole, const char *from, const char *to)
+{
+    const char *found = strstr(whole, from);
+    if (!found)
+        fail_msg("'%s' is not in the base text", from);
+    const size_t before = (size_t)(found - whole), size = strlen(whole) + strlen(to) + 1;
+    char *result = malloc(size);
+    assert_non_null(result);
+    snprintf(result, size, "%.*s%s%s", (int)before, whole, to, found + strlen(from));
+    return result;
+}
+
+static void base_network_loads(void **state)
+{
+    (void)state;
+    size_t size;
+    unsigned char *bytes = build(base_network, NULL, 0, NULL, &size);
+    ascc_model *model = must_load(bytes, size);
+    check_plan(model);
+    assert_true(model->plan.output.scale[0] == 0.01 && model->plan.output.scale[1] == 0.02);
+    assert_int_equal(model->plan.parameter_count, 54 + 2 + 9 + 40 + 160);
+    assert_null(model->plan.term[1].bias);
+    assert_true(model->plan.term[0].bias[1] == 2.0f);
+    ascc_model_destroy(&model);
+}
+
+static void wrong_descriptions_are_refused_by_name(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *from, *to, *hint;
+    } cases[] = {
+        /* Text that is no JSON, or not the right kind. */
+        {"{\"name\"", "[{\"name\"", "JSON"},
+        {"\"name\":\"n\",", "\"name\":7,", "'name'"},
+        {"\"name\":\"n\",", "", "'name' is missing"},
+        {"\"name\":\"n\",", "\"name\":\"n\",\"nmae\":1,", "'nmae'"},
+        {"\"name\":\"n\",", "\"name\":\"n\",\"name\":\"n\",", "twice"},
+        {"\"n\",", "\"0123456789012345678901234567890123456789012345678901234567890123\",", "name"},
+        {"\"d\",", "[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[", "deep"},
+        /* The plan's own numbers. */
+        {"\"dimension\":2", "\"dimension\":4", "'dimension'"},
+        {"\"dimension\":2", "\"dimension\":2.5", "'dimension'"},
+        {"\"dimension\":2", "\"dimension\":3", "'gravity'"},
+        {"\"time_step\":0.01", "\"time_step\":0", "'time_step'"},
+        {"\"time_step\":0.01", "\"time_step\":-1", "'time_step'"},
+        {"\"time_step\":0.01", "\"time_step\":1e300", "'time_step'"},
+        {"[0,-9.81]", "[0]", "'gravity'"},
+        {"[0,-9.81]", "[0,\"down\"]", "'gravity'"},
+        {"[0,-9.81]", "[0,1e99]", "'gravity'"},
+        {"\"particle_spacing\":0.05", "\"particle_spacing\":-0.05", "'particle_spacing'"},
+        {"\"rest_density\":1000,", "", "'rest_density'"},
+        {"\"current\"", "\"sideways\"", "'sideways'"},
+        {"\"boundary_crop\":0.5", "\"boundary_crop\":-1", "'boundary_crop'"},
+        /* Features. */
+        {"[\"one\",\"velocity\"]", "[\"one\",\"normal\"]", "fluid"},
+        {"[\"one\",\"velocity\"]", "[\"one\",\"one\"]", "twice"},
+        {"[\"one\",\"velocity\"]", "[\"one\",\"colour\"]", "'colour'"},
+        {"[\"one\",\"velocity\"]", "[\"one\",1]", "fluid"},
+        {"[\"one\",\"velocity\"]", "[]", "channels"},
+        {"[\"one\",\"velocity\"]", "[\"one\"]", "'k' takes 3 channels, but its source has 1"},
+        {"[\"one\",\"normal\"]", "[\"one\",\"velocity\"]", "boundary"},
+        {"\"boundary\":[\"one\",\"normal\"]", "\"wall\":[]", "'boundary'"},
+        /* Levels and sampling. */
+        {"\"levels\":[{\"voxel\":0.1}],", "", "'sampling'"},
+        {"\"levels\":[{\"voxel\":0.1}]", "\"levels\":[]", "no such level"},
+        {"[{\"voxel\":0.1}]", "[{\"voxel\":0}]", "'voxel'"},
+        {"[{\"voxel\":0.1}]", "[{\"ratio\":0.5}]", "'voxel'"},
+        {"[{\"voxel\":0.1}]", "[0.1]", "object"},
+        {"[{\"voxel\":0.1}]", "[{\"voxel\":0.1,\"x\":1}]", "'x'"},
+        {"[{\"voxel\":0.1}]",
+         "[{\"voxel\":1},{\"voxel\":1},{\"voxel\":1},{\"voxel\":1},{\"voxel\":1},{\"voxel\":1},"
+         "{\"voxel\":1},{\"voxel\":1}]",
+         "more than 7"},
+        {"\"voxel_corners\"", "\"dice\"", "'dice'"},
+        {"\"voxel_corners\"", "\"farthest\"", "'anchor'"},
+        {"\"voxel_corners\"", "\"voxel_centers\"", "'hysteresis'"},
+        {"\"anchor\":\"world\",", "", "'anchor'"},
+        {"\"hysteresis\":0.1", "\"hysteresis\":0.6", "'hysteresis'"},
+        /* Layers. */
+        {"\"name\":\"a\"", "\"name\":\"fluid\"", "reserved"},
+        {"\"name\":\"a\"", "\"name\":\"all\"", "reserved"},
+        {"\"name\":\"a\"", "\"name\":\"\"", "empty"},
+        {"\"name\":\"b\"", "\"name\":\"a\"", "taken"},
+        {"\"name\":\"a\"", "\"name\":\"a234567890123456789012345678901234567890\"", "layer"},
+        {"\"points\":\"all\"", "\"points\":\"some\"", "'some'"},
+        {"\"points\":\"level1\"", "\"points\":\"level2\"", "no such level"},
+        {"\"points\":\"all\"", "\"points\":\"level1\"", "shares no points"},
+        {"\"points\":\"all\"", "\"points\":\"boundary\"", "shares no points"},
+        {"\"channels\":5", "\"channels\":4", "columns [2, 5)"},
+        {"\"channels\":5", "\"channels\":0", "'channels'"},
+        {"\"channels\":5", "\"channels\":1025", "'channels'"},
+        {"\"channels\":5", "\"channels\":6", "'k2' takes 5 channels, but its source has 6"},
+        {"\"channels\":2,\"terms\":[", "\"channels\":2,\"terms\":[],\"x\":[", "'x'"},
+        /* Terms. */
+        {"\"type\":\"convolution\"", "\"type\":\"attention\"", "'attention'"},
+        {"\"source\":\"fluid\"", "\"source\":\"b\"", "'b'"},
+        {"\"source\":\"fluid\"", "\"source\":\"a\"", "before"},
+        {"\"source\":\"a\",\"relu\"", "\"source\":\"b\",\"relu\"", "before"},
+        {"\"source\":\"fluid\",\"kernel\"", "\"source\":\"air\",\"kernel\"", "'air'"},
+        {"\"kernel\":\"k\"", "\"kernel\":\"none\"", "'none' is missing"},
+        {"\"kernel\":\"k\"", "\"kernel\":\"w\"", "dimensions"},
+        {"\"bias\":\"kb\"", "\"bias\":\"w\"", "dimensions"},
+        {"\"bias\":\"kb\",", "", "'kb' is not used"},
+        {"\"weight\":\"w\"", "\"weight\":\"w\",\"bias\":\"kb\"", "'kb' has 2 values"},
+        {"\"weight\":\"w\"", "\"weight\":\"w\",\"radius\":1", "'radius'"},
+        {"\"column\":2,\"relu\":true", "\"column\":3,\"relu\":true", "columns [3, 6)"},
+        {"\"column\":2,\"relu\":true", "\"column\":-1,\"relu\":true", "'column'"},
+        {"\"column\":2,\"relu\":true", "\"column\":2147483647,\"relu\":true", "columns"},
+        {"\"column\":2,\"relu\":true", "\"column\":2,\"relu\":1", "'relu'"},
+        {"\"radius\":0.1", "\"radius\":0", "'radius'"},
+        {"\"radius\":0.1,", "", "'radius'"},
+        {"\"window\":\"poly6\"", "\"window\":\"poly9\"", "'poly9'"},
+        {"\"mapping\":\"volume\"", "\"mapping\":\"sphere\"", "'sphere'"},
+        {"\"neighbor_limit\":9", "\"neighbor_limit\":-9", "'neighbor_limit'"},
+        {"\"skip_self\":false", "\"skip_self\":null", "'skip_self'"},
+        /* The output. */
+        {"\"output\":{", "\"outputs\":{", "'output'"},
+        {"\"type\":\"antisymmetric\"", "\"type\":\"symmetric\"", "'symmetric'"},
+        {"\"type\":\"antisymmetric\"", "\"type\":\"plain\"", "output"},
+        {"\"antisymmetric\",\"source\":\"a\"", "\"antisymmetric\",\"source\":\"b\"", "'fluid'"},
+        {"\"antisymmetric\",\"source\":\"a\"", "\"antisymmetric\",\"source\":\"boundary\"",
+         "'fluid'"},
+        {"\"antisymmetric\",\"source\":\"a\"", "\"antisymmetric\",\"source\":\"c\"", "'c'"},
+        {"\"antisymmetric\",\"source\":\"a\"", "\"antisymmetric\",\"source\":\"fluid\"",
+         "'o' takes 5 channels"},
+        {"\"stored\":\"full\"", "\"stored\":\"quarter\"", "'quarter'"},
+        {"\"stored\":\"full\"", "\"stored\":\"half\"", "'half_axis'"},
+        {"\"stored\":\"full\"", "\"stored\":\"full\",\"half_axis\":\"x\"", "'half_axis'"},
+        {"\"stored\":\"full\"", "\"stored\":\"half\",\"half_axis\":\"z\"", "along z"},
+        {"\"projection\":\"radial\"", "\"projection\":\"axial\"", "'axial'"},
+        {"[0.01,0.02]", "[0.01]", "'scale'"},
+        {"[0.01,0.02]", "1e300", "'scale'"},
+        {"[0.01,0.02]", "null", "'scale'"},
+        {"[0.01,0.02]", "1,\"bias\":\"kb\"", "'bias'"},
+    };
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        size_t size;
+        char *network = replaced(base_network, cases[i].from, cases[i].to);
+        unsigned char *bytes = build(network, NULL, 0, NULL, &size);
+        free(network);
+        must_refuse(cases[i].to, bytes, size, cases[i].hint);
+    }
+}
+
+static void layers_without_terms_are_refused(void **state)
+{
+    (void)state;
+    size_t size;
+    unsigned char *bytes;
+    char *network = replaced(base_network, "\"layers\":[",
+                             "\"layers\":[{\"name\":\"e\",\"points\":\"all\",\"channels\":1,"
+                             "\"terms\":[]},");
+    bytes = build(network, NULL, 0, NULL, &size);
+    free(network);
+    must_refuse("first", bytes, size, "'e' has no terms");
+    network = replaced(base_network, "\"neighbor_limit\":9}]}],",
+                       "\"neighbor_limit\":9}]},{\"name\":\"e\",\"points\":\"all\","
+                       "\"channels\":1,\"terms\":[]}],");
+    bytes = build(network, NULL, 0, NULL, &size);
+    free(network);
+    must_refuse("last", bytes, size, "'e' has no terms");
+}
+
+static void wrong_tensors_are_refused_by_name(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *name;
+        int rank;
+        size_t shape[5];
+        const char *hint;
+    } cases[] = {
+        {"k", 0, {0}, "'k' is missing"},
+        {"kb", 0, {0}, "'kb' is missing"},
+        {"w", 0, {0}, "'w' is missing"},
+        {"o", 0, {0}, "'o' is missing"},
+        {"k", 4, {3, 3, 3, 2}, "'k' has 4 dimensions"},
+        {"k", 5, {2, 3, 3, 3, 2}, "along z"},
+        {"k", 5, {1, 3, 3, 4, 2}, "'k' takes 4"},
+        {"k", 5, {1, 3, 3, 3, 4}, "'kb' has 2 values"},
+        {"k", 5, {1, 0, 3, 3, 2}, "cells"},
+        {"k", 5, {1, 3, 3, 3, 0}, "gives 0 channels"},
+        {"kb", 1, {3}, "'kb' has 3 values"},
+        {"w", 2, {3, 4}, "columns [2, 6)"},
+        {"w", 2, {2, 3}, "'w' takes 2"},
+        {"w", 1, {3}, "'w' has 1 dimensions"},
+        {"o", 5, {1, 4, 4, 5, 3}, "output: 3 channels"},
+        {"o", 5, {1, 4, 4, 4, 2}, "'o' takes 4"},
+        {"o", 5, {1, 4, 4, 5, 2}, "'o' is not antisymmetric"},
+        {"o", 5, {1, 3, 3, 5, 2}, "'o' is not antisymmetric"},
+    };
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        size_t size;
+        unsigned char *bytes =
+            build(base_network, cases[i].name, cases[i].rank, cases[i].shape, &size);
+        must_refuse(cases[i].name, bytes, size, cases[i].hint);
+    }
+}
+
+static void kernels_have_a_bounded_number_of_cells(void **state)
+{
+    (void)state;
+    for (size_t extra = 0; extra < 2; extra++) {
+        const size_t cells = ASCC_MAX_CELLS / 64 + extra, shape[5] = {1, 64, cells, 1, 2};
+        size_t size;
+        model_builder builder;
+        float *values = calloc(64 * cells * 2, sizeof *values);
+        assert_non_null(values);
+        model_builder_open(&builder);
+        model_builder_metadata(&builder, "format", "ascc.model");
+        model_builder_metadata(&builder, "version", "1");
+        model_builder_metadata(
+            &builder, "network",
+            "{\"name\":\"n\",\"dimension\":2,\"time_step\":0.01,\"gravity\":[0,0],"
+            "\"particle_spacing\":1,\"rest_density\":1,\"evaluate\":\"current\","
+            "\"features\":{\"fluid\":[\"one\"],\"boundary\":[]},\"layers\":[],"
+            "\"output\":{\"type\":\"antisymmetric\",\"source\":\"fluid\",\"kernel\":\"o\","
+            "\"stored\":\"full\",\"radius\":1,\"window\":\"none\",\"mapping\":\"radial\","
+            "\"projection\":\"none\",\"scale\":1}}");
+        model_builder_tensor(&builder, "o", 5, shape, values);
+        free(values);
+        unsigned char *bytes = model_builder_finish(&builder, &size);
+        if (extra) {
+            must_refuse("cells", bytes, size, "cells");
+        } else {
+            ascc_model *model = must_load(bytes, size);
+            check_plan(model);
+            ascc_model_destroy(&model);
+        }
+    }
+}
+
+static void weights_that_are_not_finite_are_refused_by_name(void **state)
+{
+    (void)state;
+    static const uint32_t bad[] = {0x7f800000u, 0xff800000u, 0x7fc00000u};
+    for (size_t i = 0; i < 3; i++) {
+        size_t size;
+        unsigned char *bytes = build(base_network, NULL, 0, NULL, &size);
+        const size_t data = size - 4 * (54 + 2 + 9 + 40 + 160);
+        for (int b = 0; b < 4; b++)
+            bytes[data + 4 * 60 + (size_t)b] = (unsigned char)(bad[i] >> 8 * b);
+        must_refuse("NaN", bytes, size, "'w' holds a value that is not finite");
+    }
+}
+
+static void metadata_must_name_the_format(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *header, *hint;
+    } cases[] = {
+        {"{}", "'format'"},
+        {"{\"__metadata__\":{}}", "'format'"},
+        {"{\"__metadata__\":{\"format\":\"ascc.model\"}}", "'version'"},
+        {"{\"__metadata__\":{\"format\":\"pt\",\"version\":\"1\"}}", "'pt'"},
+        {"{\"__metadata__\":{\"format\":\"ascc.model\",\"version\":\"2\"}}", "'2'"},
+        {"{\"__metadata__\":{\"format\":\"ascc.model\",\"version\":\"1\"}}", "'network'"},
+        {"{\"__metadata__\":{\"format\":\"ascc.model\",\"version\":\"1\",\"network\":\"\"}}",
+         "JSON"},
+        {"{\"__metadata__\":{\"format\":\"ascc.model\",\"version\":\"1\",\"network\":\"[]\"}}",
+         "object"},
+        {"{\"__metadata__\":{\"format\":\"ascc.weights\",\"version\":\"1\"}}", "'architecture'"},
+        {"{\"__metadata__\":{\"format\":\"ascc.sequence\",\"version\":\"1\"}}", "ascc.sequence"},
+    };
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        size_t size;
+        unsigned char *bytes = model_builder_raw(cases[i].header, NULL, 0, &size);
+        must_refuse(cases[i].header, bytes, size, cases[i].hint);
+    }
+}
+
+static void every_truncation_is_refused(void **state)
+{
+    (void)state;
+    size_t size;
+    unsigned char *bytes = build(base_network, NULL, 0, NULL, &size);
+    for (size_t n = 0; n < size; n += n < 64 ? 1 : 7) {
+        unsigned char *part = malloc(n ? n : 1);
+        assert_non_null(part);
+        memcpy(part, bytes, n);
+        must_refuse("truncated", part, n, "");
+    }
+    free(bytes);
+}
+
+static void weights_of_other_types_are_refused_by_name(void **state)
+{
+    (void)state;
+    static const char network[] =
+        "{\"__metadata__\":{\"format\":\"ascc.model\",\"version\":\"1\",\"network\":"
+        "\"{\\\"name\\\":\\\"n\\\",\\\"dimension\\\":2,\\\"time_step\\\":1,\\\"gravity\\\":[0,0],"
+        "\\\"particle_spacing\\\":1,\\\"rest_density\\\":1,\\\"evaluate\\\":\\\"current\\\","
+        "\\\"features\\\":{\\\"fluid\\\":[\\\"velocity\\\"],\\\"boundary\\\":[]},\\\"layers\\\":[],"
+        "\\\"output\\\":{\\\"type\\\":\\\"plain\\\",\\\"source\\\":\\\"fluid\\\",\\\"scale\\\":1}}"
+        "\"}"
+        "%s}";
+    char header[1024];
+    size_t size;
+    unsigned char zeros[8] = {0};
+    snprintf(header, sizeof header, network, "");
+    unsigned char *bytes = model_builder_raw(header, NULL, 0, &size);
+    ascc_model *model = must_load(bytes, size);
+    check_plan(model);
+    assert_int_equal(model->plan.parameter_count, 0);
+    ascc_model_destroy(&model);
+    snprintf(header, sizeof header, network,
+             ",\"extra\":{\"dtype\":\"F16\",\"shape\":[4],\"data_offsets\":[0,8]}");
+    bytes = model_builder_raw(header, zeros, 8, &size);
+    must_refuse("unused", bytes, size, "'extra' is not used");
+
+    static const char from[] = "{\"dtype\":\"F32\",\"shape\":[2]";
+    bytes = build(base_network, NULL, 0, NULL, &size);
+    for (size_t i = 8; i + sizeof from - 1 < size; i++)
+        if (memcmp(bytes + i, from, sizeof from - 1) == 0)
+            memcpy(bytes + i, "{\"dtype\":\"I32\"", 14);
+    must_refuse("I32", bytes, size, "'kb' is I32");
+}
+
+/* ---- Published networks ------------------------------------------------------------------------- */
+
+static void small_dmcf_becomes_the_plan_it_describes(void **state)
+{
+    (void)state;
+    size_t size;
+    unsigned char *bytes = model_builder_dmcf(NULL, NULL, &size);
+    ascc_model *model = must_load(bytes, size);
+    check_plan(model);
+    const ascc_plan *plan = &model->plan;
+    assert_int_equal(plan->advection, ASCC_ADVECT_END);
+    assert_true(plan->boundary_crop == 0.8 && plan->hysteresis == 0.1 && plan->spacing == 0.0625);
+    assert_int_equal(plan->sampling, ASCC_SAMPLING_CORNERS);
+    assert_int_equal(plan->centroid_anchor, 1);
+    assert_int_equal(plan->level_count, 2);
+    assert_true(plan->level[1].voxel == 0.05);
+    assert_int_equal(plan->layer_count, 4);
+    static const char *const names[] = {"l0", "l1.out_0", "l1.out_1", "l2.out_0"};
+    static const int32_t terms[] = {4, 2, 1, 4};
+    for (int i = 0; i < 4; i++) {
+        assert_string_equal(plan->layer[i].name, names[i]);
+        assert_int_equal(plan->layer[i].term_count, terms[i]);
+    }
+    /* l2: convolution, dense and residual from branch 0, then the convolution from branch 1. */
+    const ascc_term *term = &plan->term[plan->layer[3].first_term];
+    static const ascc_term_kind kinds[] = {ASCC_TERM_CONVOLUTION, ASCC_TERM_CONVOLUTION,
+                                           ASCC_TERM_DENSE, ASCC_TERM_IDENTITY};
+    static const int32_t sources[] = {3, 4, 3, 3}, rectified[] = {1, 1, 1, 0};
+    for (int i = 0; i < 4; i++) {
+        assert_int_equal(term[i].kind, kinds[i]);
+        assert_int_equal(term[i].source, sources[i]);
+        assert_int_equal(term[i].rectify, rectified[i]);
+    }
+    assert_true(term[0].filter.radius == 0.1 && term[1].filter.radius == 0.2);
+    assert_int_equal(term[0].filter.skip_self, 0);
+    assert_int_equal(term[0].filter.window, ASCC_WINDOW_POLY6);
+    assert_int_equal(plan->term[0].rectify, 0);
+    assert_int_equal(plan->output.filter.cells[1], 4);
+    assert_int_equal(plan->output.filter.window, ASCC_WINDOW_PEAK);
+    assert_int_equal(plan->output.radial, 0);
+    assert_true(plan->output.scale[2] == 0.0078125);
+    ascc_model_destroy(&model);
+}
+
+static void small_cconv_becomes_the_plan_it_describes(void **state)
+{
+    (void)state;
+    size_t size;
+    unsigned char *bytes = model_builder_cconv(NULL, NULL, &size);
+    ascc_model *model = must_load(bytes, size);
+    check_plan(model);
+    const ascc_plan *plan = &model->plan;
+    assert_int_equal(plan->advection, ASCC_ADVECT_MEAN);
+    assert_true(plan->boundary_crop <= 0.0);
+    assert_true(fabs(plan->spacing - 0.05) < 1e-15);
+    assert_int_equal(plan->boundary_channels, 3);
+    assert_int_equal(plan->layer_count, 4);
+    assert_int_equal(plan->layer[0].set, ASCC_SET_FLUID);
+    assert_int_equal(plan->term[0].source, 1);
+    assert_int_equal(plan->term[1].column, 1);
+    assert_int_equal(plan->layer[2].term_count, 3);
+    assert_int_equal(plan->term[0].filter.skip_self, 1);
+    assert_int_equal(plan->output.kind, ASCC_OUTPUT_PLAIN);
+    assert_int_equal(plan->output.source, 5);
+    ascc_model_info info = {.size = sizeof info};
+    assert_int_equal(ascc_model_get_info(model, &info), ASCC_OK);
+    assert_int_equal(info.conserves_momentum, 0);
+    assert_true(info.support_radius == 0.1125);
+    ascc_model_destroy(&model);
+}
+
+static void published_text_not_understood_is_refused(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *from, *to, *hint;
+    } both[] = {
+        {"\"timestep\": 0.02", "\"timestep\": 0", "'timestep'"},
+        {"[0, -9.81, 0]", "[0, -9.81]", "'gravity'"},
+        {"p2=p1+dt*", "p2=p1-dt*", "'integration'"},
+        {"v2.y", "v2.x", "'v2.x'"},
+        {", \"v2.z\"]", "]", "within a vector"},
+        {"n.z", "n.w", "'n.w'"},
+        {"poly6", "poly7", "'window'"},
+        {"[2, 2, 2], \"", "[2, 2, 3], \"", "'kernel_size'"},
+        {"volume_preserving", "cubic", "'coordinate_mapping'"},
+        {"trilinear", "nearest", "'interpolation'"},
+        {"\"align_corners\": true", "\"align_corners\": false", "'align_corners'"},
+        {"\"normalize\": false", "\"normalize\": true", "'normalize'"},
+        {"\"timestep\"", "\"circular\": true, \"timestep\"", "'circular'"},
+        {"dim 3", "dim 2", "contradict"},
+        {"\"network\": \"", "\"network\": \"GNS ", "'network'"},
+        {"[z,y,x,in,out]", "[x,y,z,in,out]", "'kernel_axis_order'"},
+        {"row-major", "column-major", "'kernel_axis_order'"},
+    };
+    for (size_t i = 0; i < sizeof both / sizeof *both; i++) {
+        size_t size;
+        unsigned char *bytes = model_builder_cconv(both[i].from, both[i].to, &size);
+        must_refuse(both[i].to, bytes, size, both[i].hint);
+        bytes = model_builder_dmcf(both[i].from, both[i].to, &size);
+        must_refuse(both[i].to, bytes, size, both[i].hint);
+    }
+}
+
+static void published_dmcf_contradictions_are_refused(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *from, *to, *hint;
+    } cases[] = {
+        {"max(p2)+0.8", "max(p2)+0.9", "'boundary_crop'"},
+        {"\"use_vel\": true", "\"use_vel\": false", "'use_vel'"},
+        {"\"use_acc\": false", "\"use_acc\": true", "'use_acc'"},
+        {"\"stride\": 2", "\"stride\": 4", "'voxel'"},
+        {"\"stride\": 1", "\"stride\": 2", "'stride'"},
+        {"\"radius\": 0.2", "\"radius\": 0.05", "'radius'"},
+        {"\"pad\": 0", "\"pad\": 1", "'pad'"},
+        {"\"centralize\": true", "\"centralize\": false", "'centralize'"},
+        {"branch 0 points for", "the finer branch for", "'source'"},
+        {"coarser of the two", "finer of the two", "'cross_branch_radius'"},
+        {"sum (add_merge)", "concat", "'merge'"},
+        {"every l1,l2 conv", "every l1 conv", "'activation'"},
+        {"l2.out_0 += l1.out_0", "l1.out_0 += l0", "'residual'"},
+        {"l1.dense_0, l2.dense_0", "l1.dense_0/1, l2.dense_0", "'dense'"},
+        {"\"out\": 3", "\"out\": 4", "'concat'"},
+        {"conv_fluid(1)", "conv_fluid(2)", "'concat'"},
+        {"\"inputs\": {\"0\": 3}", "\"inputs\": {\"0\": 4}", "'inputs'"},
+        {"\"0\": 2, \"1\": 1}}", "\"0\": 3, \"1\": 1}}", "gives 2 channels, but 3"},
+        {"\"0\": 2, \"1\": 1}}", "\"0\": 2, \"7\": 1}}", "'7'"},
+        {"{\"name\": \"l2\"", "{\"name\": \"l3\"", "'name'"},
+        {"\"outputs\": {\"0\": 3}}]", "\"outputs\": {\"0\": 2}}]", "sym0"},
+        {"[2,2,2,2,3]", "[2,2,2,2,4]", "'stored'"},
+        {"\"sym_axis\": 1", "\"sym_axis\": 0", "'sym_axis'"},
+        {"\"sym_axis\": 1", "\"sym_axis\": 3", "'sym_axis'"},
+        {"(f_i+f_k)", "(f_i-f_k)", "'formula'"},
+        {"relu(l2.out_0)", "relu(l1.out_0)", "'formula'"},
+        {"[2, 4, 2]", "[4, 4, 2]", "'kernel_size'"},
+        {"peak: ", "peek: ", "'window'"},
+        {"dt 0.02 s", "dt 0.03 s", "'trained_with'"},
+        {"gravity -9.81 along", "gravity -1 along", "'trained_with'"},
+    };
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        size_t size;
+        unsigned char *bytes = model_builder_dmcf(cases[i].from, cases[i].to, &size);
+        must_refuse(cases[i].to, bytes, size, cases[i].hint);
+    }
+}
+
+static void published_cconv_contradictions_are_refused(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *from, *to, *hint;
+    } cases[] = {
+        {"\"extent\": 0.225", "\"extent\": 0.2", "'extent'"},
+        {"widths 3,2,2,3", "widths 3,2,2", "'layers'"},
+        {"widths 3,2,2,3", "widths 3,2,3,3", "'conv2' gives 2 channels"},
+        {"widths 3,2,2,3", "widths 4,2,2,3", "'layers'"},
+        {"i=1..3", "i=1..99", "'layers'"},
+        {"only i=2", "only i=1", "residual"},
+        {"A_3/128", "A_3/64", "'out_scale'"},
+        {"A_3/128", "A_2/128", "'layers'"},
+        {"conv0_fluid(1)", "conv0_fluid(2)", "'layers'"},
+    };
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        size_t size;
+        unsigned char *bytes = model_builder_cconv(cases[i].from, cases[i].to, &size);
+        must_refuse(cases[i].to, bytes, size, cases[i].hint);
+    }
+}
+
+static void published_files_load_as_they_are(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *name;
+        uint64_t parameters;
+        int32_t levels, layers, conserves;
+        double support, receptive;
+    } files[] = {{"dmcf-liquid3d", 275084, 3, 9, 1, 0.1, 1.4},
+                 {"cconv-liquid3d", 692902, 1, 4, 0, 0.1125, 0.45}};
+    const char *root = getenv("ASCC_SHARED");
+    for (size_t i = 0; i < 2; i++) {
+        char path[512];
+        ascc_model *model = NULL;
+        snprintf(path, sizeof path, "%s/data/weights/%s.safetensors",
+                 root ? root : SOURCE_ROOT "/../shared", files[i].name);
+        FILE *file = fopen(path, "rb");
+        if (!file) {
+            print_message("SKIP: %s is not there\n", path);
+            continue;
+        }
+        fclose(file);
+        if (ascc_model_load(context, path, &model) != ASCC_OK) {
+            ascc_context_message(context, text, sizeof text);
+            fail_msg("%s: %s", path, text);
+        }
+        check_plan(model);
+        ascc_model_info info = {.size = sizeof info};
+        assert_int_equal(ascc_model_get_info(model, &info), ASCC_OK);
+        assert_string_equal(info.name, files[i].name);
+        assert_int_equal(info.parameter_count, files[i].parameters);
+        assert_int_equal(info.dimension, 3);
+        assert_int_equal(info.level_count, files[i].levels);
+        assert_int_equal(info.layer_count, files[i].layers);
+        assert_int_equal(info.conserves_momentum, files[i].conserves);
+        assert_true(info.time_step == 0.02 && info.gravity[1] == -9.81);
+        assert_true(fabs(info.particle_spacing - 0.05) < 1e-15 && info.rest_density == 1000.0);
+        assert_true(info.support_radius == files[i].support);
+        assert_true(fabs(info.receptive_radius - files[i].receptive) < 1e-12);
+        ascc_model_destroy(&model);
+    }
+}
+
+static void descriptions_that_the_fuzzer_starts_from_load(void **state)
+{
+    (void)state;
+    for (const char *kind = "ndc"; *kind != '\0'; kind++) {
+        size_t size;
+        char *description = model_builder_description(*kind);
+        unsigned char *bytes = model_builder_described(*kind, description, &size);
+        free(description);
+        ascc_model *model = must_load(bytes, size);
+        check_plan(model);
+        ascc_model_destroy(&model);
+    }
+}
+
+/* ---- Memory ------------------------------------------------------------------------------------- */
+
+/* Fails the n-th allocation of a load for every n; nothing may stay behind. */
+static void fail_every_allocation(unsigned char *bytes, size_t size)
+{
+    long n = 1;
+    for (bool loaded = false; !loaded; n++) {
+        failing_allocator failing = {.fail_at = 0};
+        const ascc_context_options options = {.size = sizeof options,
+                                              .allocate = failing_allocate,
+                                              .reallocate = failing_reallocate,
+                                              .release = failing_release,
+                                              .user = &failing};
+        ascc_context *own = NULL;
+        ascc_model *model = NULL;
+        assert_int_equal(ascc_context_create(&options, &own), ASCC_OK);
+        const long blocks = failing.blocks;
+        failing.calls = 0;
+        failing.fail_at = n;
+        const ascc_status status = ascc_model_load_memory(own, bytes, size, &model);
+        loaded = failing.calls < n;
+        assert_int_equal(status, loaded ? ASCC_OK : ASCC_ERROR_MEMORY);
+        if (!loaded)
+            assert_int_equal(failing.blocks, blocks);
+        ascc_model_destroy(&model);
+        ascc_context_destroy(&own);
+        assert_int_equal(failing.blocks, 0);
+        assert_int_equal(failing.bytes, 0);
+    }
+    assert_true(n > 12);
+    free(bytes);
+}
+
+static void every_failing_allocation_is_reported(void **state)
+{
+    (void)state;
+    size_t size;
+    unsigned char *bytes = model_builder_random(&(model_random){.levels = 2}, &size);
+    fail_every_allocation(bytes, size);
+    bytes = model_builder_dmcf(NULL, NULL, &size);
+    fail_every_allocation(bytes, size);
+    bytes = model_builder_cconv(NULL, NULL, &size);
+    fail_every_allocation(bytes, size);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(random_models_of_all_shapes_load),
+        cmocka_unit_test(demonstration_models_are_antisymmetric_and_radial),
+        cmocka_unit_test(halves_are_mirrored_along_each_axis),
+        cmocka_unit_test(plan_says_what_the_file_says),
+        cmocka_unit_test(saved_again_is_byte_identical),
+        cmocka_unit_test(arguments_and_paths_are_checked),
+        cmocka_unit_test(model_outlives_its_context),
+        cmocka_unit_test(base_network_loads),
+        cmocka_unit_test(wrong_descriptions_are_refused_by_name),
+        cmocka_unit_test(layers_without_terms_are_refused),
+        cmocka_unit_test(wrong_tensors_are_refused_by_name),
+        cmocka_unit_test(kernels_have_a_bounded_number_of_cells),
+        cmocka_unit_test(weights_that_are_not_finite_are_refused_by_name),
+        cmocka_unit_test(metadata_must_name_the_format),
+        cmocka_unit_test(every_truncation_is_refused),
+        cmocka_unit_test(weights_of_other_types_are_refused_by_name),
+        cmocka_unit_test(small_dmcf_becomes_the_plan_it_describes),
+        cmocka_unit_test(small_cconv_becomes_the_plan_it_describes),
+        cmocka_unit_test(published_text_not_understood_is_refused),
+        cmocka_unit_test(published_dmcf_contradictions_are_refused),
+        cmocka_unit_test(published_cconv_contradictions_are_refused),
+        cmocka_unit_test(published_files_load_as_they_are),
+        cmocka_unit_test(descriptions_that_the_fuzzer_starts_from_load),
+        cmocka_unit_test(every_failing_allocation_is_reported),
+    };
+    return cmocka_run_group_tests(tests, open_context, close_context);
+}

@@ -1,0 +1,841 @@
+/* The laws of a step: momentum to the bit, determinism, transactions, steady memory.
+ * SPDX-License-Identifier: MIT */
+#include <math.h>
+
+#include "../examples/demo_model.h"
+#include "particles.h"
+#include "support/model_builder.h"
+#include "support/tools.h"
+
+/* ---- Scenes and models ---- */
+
+typedef struct world {
+    ascc_context *context;
+    ascc_model *model;
+    ascc_particles *particles;
+    ascc_step *step;
+} world;
+
+typedef struct world_options {
+    int32_t dimension, threads, neighbor_limit;
+    uint32_t cpu_disable;
+    bool radial, walls, unequal, random_network;
+    uint32_t shuffle;
+    double far;  /* one more particle this far away; 0 = none */
+    double unit; /* metres in the host's length; 0 = 1 */
+    ascc_context_options context;
+} world_options;
+
+static const double spacing = 0.05;
+
+/* A small network with two levels and an antisymmetric last layer, or the demonstration model. */
+static ascc_model *make_model(ascc_context *context, const world_options *o)
+{
+    ascc_model *model = NULL;
+    size_t size;
+    unsigned char *bytes;
+    if (o->random_network) {
+        const model_random r = {.seed = 5,
+                                .dimension = o->dimension,
+                                .levels = 2,
+                                .channels = 8,
+                                .spacing = spacing,
+                                .projection = o->radial ? "radial" : "none",
+                                .neighbor_limit = o->neighbor_limit};
+        bytes = model_builder_random(&r, &size);
+    } else {
+        bytes = demo_model_bytes(o->dimension, spacing, &size);
+    }
+    assert_non_null(bytes);
+    if (ascc_model_load_memory(context, bytes, size, &model) != ASCC_OK) {
+        char text[256];
+        ascc_context_message(context, text, sizeof text);
+        fail_msg("model: %s", text);
+    }
+    free(bytes);
+    return model;
+}
+
+/* Two jittered blocks flying at each other, a little off centre. */
+static size_t droplets(const world_options *o, double *x, double *v, double *m)
+{
+    dice d = {31};
+    const int side = o->dimension == 2 ? 9 : 5;
+    const double unit = o->unit > 0.0 ? o->unit : 1.0;
+    size_t n = 0;
+    for (int drop = 0; drop < 2; drop++)
+        for (int k = 0; k < (o->dimension == 2 ? 1 : side); k++)
+            for (int j = 0; j < side; j++)
+                for (int i = 0; i < side; i++, n++) {
+                    const int at[3] = {i, j, k};
+                    for (int c = 0; c < o->dimension; c++) {
+                        double p = (at[c] + dice_uniform(&d, -0.1, 0.1)) * spacing;
+                        p += c == 0 ? drop * (side + 1) * spacing : c == 1 ? drop * 0.03 : 0.0;
+                        x[n * (size_t)o->dimension + (size_t)c] = p / unit;
+                        v[n * (size_t)o->dimension + (size_t)c] =
+                            (c == 0 ? (drop ? -0.7 : 0.7) : dice_uniform(&d, -0.05, 0.05)) / unit;
+                    }
+                    m[n] = o->unequal ? 0.125 * (1.0 + (double)(dice_next(&d) % 7)) : 0.125;
+                }
+    return n;
+}
+
+static void shuffle_rows(double *x, double *v, double *m, size_t n, size_t d, uint32_t seed)
+{
+    dice r = {seed};
+    for (size_t i = n - 1; i > 0; i--) {
+        const size_t j = dice_next(&r) % (i + 1);
+        for (size_t c = 0; c < d; c++) {
+            const double sx = x[i * d + c], sv = v[i * d + c];
+            x[i * d + c] = x[j * d + c];
+            v[i * d + c] = v[j * d + c];
+            x[j * d + c] = sx;
+            v[j * d + c] = sv;
+        }
+        const double sm = m[i];
+        m[i] = m[j];
+        m[j] = sm;
+    }
+}
+
+/* A floor and a side wall, bodies 3 and 8. */
+static void add_walls(ascc_particles *p, const world_options *o)
+{
+    const size_t d = (size_t)o->dimension;
+    const double unit = o->unit > 0.0 ? o->unit : 1.0;
+    for (int body = 0; body < 2; body++) {
+        double x[800 * 3], normal[800 * 3];
+        size_t n = 0;
+        for (int j = 0; j < (d == 2 ? 1 : 28); j++)
+            for (int i = 0; i < 28; i++, n++) {
+                const double a = (i - 6) * 0.64 * spacing, b = (j - 6) * 0.64 * spacing;
+                const double floor_at[3] = {a, -0.7 * spacing, b};
+                const double side_at[3] = {-0.7 * spacing, a, b};
+                for (size_t c = 0; c < d; c++) {
+                    x[n * d + c] = (body ? side_at : floor_at)[c] / unit;
+                    normal[n * d + c] = c == (body ? 0u : 1u) ? 1.0 : 0.0;
+                }
+            }
+        const ascc_const_array position = {.data = x, .scalar = ASCC_DOUBLE};
+        const ascc_const_array normals = {.data = normal, .scalar = ASCC_DOUBLE};
+        assert_int_equal(ascc_particles_add_boundary(p, n, &position, &normals, body ? 8 : 3, NULL),
+                         ASCC_OK);
+    }
+}
+
+static world open_world(const world_options *o)
+{
+    world w = {0};
+    ascc_context_options context = o->context;
+    context.size = sizeof context;
+    if (!context.thread_count)
+        context.thread_count = o->threads;
+    context.cpu_disable = o->cpu_disable;
+    assert_int_equal(ascc_context_create(&context, &w.context), ASCC_OK);
+    w.model = make_model(w.context, o);
+    const double unit = o->unit > 0.0 ? o->unit : 1.0;
+    const ascc_particles_options options = {.size = sizeof options,
+                                            .dimension = o->dimension,
+                                            .spacing = spacing / unit,
+                                            .mass = 0.125};
+    assert_int_equal(ascc_particles_create(w.context, &options, &w.particles), ASCC_OK);
+    const size_t d = (size_t)o->dimension;
+    double x[300 * 3], v[300 * 3], m[300];
+    size_t n = droplets(o, x, v, m);
+    if (o->far != 0.0) {
+        for (size_t c = 0; c < d; c++) {
+            x[n * d + c] = o->far;
+            v[n * d + c] = 0.0;
+        }
+        m[n++] = 0.125;
+    }
+    if (o->shuffle)
+        shuffle_rows(x, v, m, n, d, o->shuffle);
+    const ascc_const_array position = {.data = x, .scalar = ASCC_DOUBLE};
+    const ascc_const_array velocity = {.data = v, .scalar = ASCC_DOUBLE};
+    const ascc_const_array mass = {.data = m, .scalar = ASCC_DOUBLE};
+    assert_int_equal(ascc_particles_add_fluid(w.particles, n, &position, &velocity, &mass, NULL),
+                     ASCC_OK);
+    if (o->walls)
+        add_walls(w.particles, o);
+    const ascc_step_options step = {.size = sizeof step, .length_unit = o->unit};
+    assert_int_equal(ascc_step_create(w.context, w.model, &step, &w.step), ASCC_OK);
+    return w;
+}
+
+static void close_world(world *w)
+{
+    ascc_context_destroy(&w->context); /* in any order */
+    ascc_model_destroy(&w->model);
+    ascc_step_destroy(&w->step);
+    ascc_particles_destroy(&w->particles);
+}
+
+static const double no_gravity[3] = {0.0, 0.0, 0.0};
+static const double down[3] = {0.0, -9.81, 0.0};
+
+static void run(world *w, const double *gravity, int32_t steps)
+{
+    const ascc_forces forces = {.size = sizeof forces, .gravity = gravity};
+    if (ascc_step_run(w->step, w->particles, &forces, steps) != ASCC_OK)
+        fail_msg("step: %s", ascc_step_message(w->step));
+}
+
+static ascc_step_statistics statistics_of(const world *w)
+{
+    ascc_step_statistics s = {.size = sizeof s};
+    assert_int_equal(ascc_step_get_statistics(w->step, &s), ASCC_OK);
+    return s;
+}
+
+static void total_of(const world *w, int64_t total[3])
+{
+    assert_int_equal(ascc_particles_total_momentum(w->particles, total), ASCC_OK);
+}
+
+/* ---- Momentum ---- */
+
+static void check_free_momentum(const world_options *o, int32_t steps)
+{
+    world w = open_world(o);
+    int64_t before[3], after[3];
+    total_of(&w, before);
+    const uint64_t hash = ascc_particles_hash(w.particles);
+    run(&w, no_gravity, steps);
+    total_of(&w, after);
+    assert_memory_equal(before, after, sizeof before);
+    assert_true(hash != ascc_particles_hash(w.particles));
+    const ascc_step_statistics s = statistics_of(&w);
+    assert_true(s.pair_count > 100);
+    close_world(&w);
+}
+
+static void momentum_is_the_same_integer_after_a_collision(void **state)
+{
+    (void)state;
+    for (int32_t dimension = 2; dimension <= 3; dimension++)
+        for (int variant = 0; variant < 16; variant++) {
+            const world_options o = {.dimension = dimension,
+                                     .threads = variant % 4 == 3 ? 7 : 1 + variant % 4 / 2,
+                                     .unequal = variant & 1,
+                                     .radial = variant & 2,
+                                     .random_network = variant & 4,
+                                     .neighbor_limit = variant & 8 ? 6 : 0};
+            check_free_momentum(&o, o.random_network ? 20 : 100);
+        }
+}
+
+static void fluid_and_wall_impulses_sum_to_the_external_impulse(void **state)
+{
+    (void)state;
+    for (int variant = 0; variant < 8; variant++) {
+        const world_options o = {.dimension = 3 - (variant & 1),
+                                 .threads = variant & 2 ? 7 : 1,
+                                 .walls = true,
+                                 .unequal = variant & 4,
+                                 .random_network = variant & 2};
+        world w = open_world(&o);
+        int64_t walls_felt = 0;
+        for (int n = 0; n < 20; n++) {
+            int64_t before[3], after[3], three[3], eight[3], both[3];
+            total_of(&w, before);
+            run(&w, down, 1);
+            total_of(&w, after);
+            const ascc_step_statistics s = statistics_of(&w);
+            ascc_particles *p = w.particles;
+            assert_int_equal(ascc_particles_body_impulse(p, 3, NULL, three, NULL), ASCC_OK);
+            assert_int_equal(ascc_particles_body_impulse(p, 8, NULL, eight, NULL), ASCC_OK);
+            assert_int_equal(ascc_particles_body_impulse(p, -1, NULL, both, NULL), ASCC_OK);
+            for (int c = 0; c < 3; c++) {
+                assert_true(before[c] + s.external_impulse[c] - both[c] == after[c]);
+                assert_true(three[c] + eight[c] == both[c]);
+                assert_true(both[c] == s.wall_impulse[c]);
+                assert_true(before[c] == s.momentum_before[c] && after[c] == s.momentum_after[c]);
+                walls_felt |= both[c];
+            }
+        }
+        assert_true(walls_felt != 0);
+        close_world(&w);
+    }
+}
+
+static void radial_projection_conserves_angular_momentum(void **state)
+{
+    (void)state;
+    for (int32_t dimension = 2; dimension <= 3; dimension++)
+        for (int random = 0; random < 2; random++) {
+            const world_options o = {
+                .dimension = dimension, .threads = 2, .radial = true, .random_network = random};
+            world w = open_world(&o);
+            ascc_measures a = {.size = sizeof a}, b = {.size = sizeof b};
+            assert_int_equal(ascc_particles_measure(w.particles, &a), ASCC_OK);
+            run(&w, no_gravity, random ? 20 : 200);
+            assert_int_equal(ascc_particles_measure(w.particles, &b), ASCC_OK);
+            /* The demonstration model is evaluated at advected positions: the torque vanishes about
+             * where the particles will be, not where they are. */
+            const double bound = random ? 1e-6 : 2e-2;
+            for (int c = 0; c < 3; c++)
+                assert_true(fabs(a.angular_momentum[c] - b.angular_momentum[c]) <
+                            bound * a.angular_scale);
+            close_world(&w);
+        }
+}
+
+static void pair_impulses_are_along_the_line_with_radial_projection(void **state)
+{
+    (void)state;
+    const world_options o = {.dimension = 3, .threads = 1, .radial = true, .random_network = true};
+    world w = open_world(&o);
+    const double x[6] = {0.01, 0.02, 0.03, 0.04, 0.05, 0.02};
+    const ascc_const_array position = {.data = x, .scalar = ASCC_DOUBLE};
+    assert_int_equal(ascc_particles_clear(w.particles, ASCC_FLUID), ASCC_OK);
+    assert_int_equal(ascc_particles_add_fluid(w.particles, 2, &position, NULL, NULL, NULL),
+                     ASCC_OK);
+    run(&w, no_gravity, 1);
+    int64_t p[6];
+    assert_int_equal(ascc_particles_get_momentum(w.particles, 0, 2, p), ASCC_OK);
+    assert_true(p[0] == -p[3] && p[1] == -p[4] && p[2] == -p[5]);
+    assert_true(p[0] != 0);
+    assert_true(fabs((double)p[1] / (double)p[0] - 1.0) < 1e-5);
+    assert_true(fabs((double)p[2] / (double)p[0] + 1.0 / 3.0) < 1e-5);
+    close_world(&w);
+}
+
+/* ---- Determinism ---- */
+
+static uint64_t hash_after(const world_options *o, int32_t steps)
+{
+    world w = open_world(o);
+    run(&w, o->walls ? down : no_gravity, steps);
+    const uint64_t hash = ascc_particles_hash(w.particles);
+    close_world(&w);
+    return hash;
+}
+
+static void bits_do_not_depend_on_threads_cpu_or_order(void **state)
+{
+    (void)state;
+    for (int variant = 0; variant < 8; variant++) {
+        world_options o = {.dimension = 3 - (variant & 1),
+                           .threads = 1,
+                           .random_network = variant & 2,
+                           .walls = variant & 4,
+                           .neighbor_limit = variant & 2 ? 9 : 0};
+        const int32_t steps = o.random_network ? 20 : 60;
+        const uint64_t want = hash_after(&o, steps);
+        for (int32_t threads = 2; threads <= 7; threads = threads * 2 + 1) {
+            o.threads = threads;
+            assert_true(hash_after(&o, steps) == want);
+        }
+        o.cpu_disable = ASCC_CPU_AVX2 | ASCC_CPU_AVX512 | ASCC_CPU_NEON;
+        assert_true(hash_after(&o, steps) == want);
+        o.cpu_disable = 0;
+        for (o.shuffle = 1; o.shuffle < 4; o.shuffle++)
+            assert_true(hash_after(&o, steps) == want);
+    }
+}
+
+/* A host's job system that runs tasks at once, last first. */
+static void *enqueue_reversed(void *user, ascc_task task, void *work, int32_t count)
+{
+    (void)user;
+    for (int32_t i = count; i-- > 0;)
+        task(work, i);
+    return NULL;
+}
+
+static void finish_nothing(void *user, void *token)
+{
+    (void)user;
+    (void)token;
+}
+
+static void bits_do_not_depend_on_the_hosts_job_system(void **state)
+{
+    (void)state;
+    world_options o = {.dimension = 3, .threads = 1, .random_network = true, .walls = true};
+    const uint64_t want = hash_after(&o, 10);
+    o.context.thread_count = 4;
+    o.context.enqueue = enqueue_reversed;
+    o.context.finish = finish_nothing;
+    assert_true(hash_after(&o, 10) == want);
+}
+
+static void a_far_particle_changes_no_bit_of_the_others(void **state)
+{
+    (void)state;
+    for (int32_t dimension = 2; dimension <= 3; dimension++) {
+        const world_options near = {.dimension = dimension, .threads = 2, .random_network = true};
+        world_options far = near;
+        far.far = 2e5;
+        world a = open_world(&near), b = open_world(&far);
+        run(&a, no_gravity, 10);
+        run(&b, no_gravity, 10);
+        const size_t n = ascc_particles_count(a.particles, ASCC_FLUID);
+        assert_int_equal(ascc_particles_count(b.particles, ASCC_FLUID), n + 1);
+        const size_t d = (size_t)dimension;
+        assert_memory_equal(a.particles->position, b.particles->position, n * d * sizeof(double));
+        assert_memory_equal(a.particles->momentum, b.particles->momentum, n * d * sizeof(int64_t));
+        close_world(&a);
+        close_world(&b);
+    }
+}
+
+static void many_steps_at_once_equal_single_steps(void **state)
+{
+    (void)state;
+    const world_options o = {.dimension = 2, .threads = 1, .walls = true};
+    world a = open_world(&o), b = open_world(&o);
+    run(&a, down, 30);
+    for (int n = 0; n < 30; n++)
+        run(&b, down, 1);
+    assert_true(ascc_particles_hash(a.particles) == ascc_particles_hash(b.particles));
+    assert_int_equal(statistics_of(&a).steps, 30);
+    close_world(&a);
+    close_world(&b);
+}
+
+static void a_restored_run_goes_on_bit_for_bit(void **state)
+{
+    (void)state;
+    const world_options o = {.dimension = 3, .threads = 2, .walls = true};
+    world w = open_world(&o);
+    run(&w, down, 10);
+    const size_t size = ascc_particles_snapshot_size(w.particles);
+    void *memory = malloc(size);
+    assert_int_equal(ascc_particles_snapshot(w.particles, memory, size), ASCC_OK);
+    run(&w, down, 25);
+    const uint64_t want = ascc_particles_hash(w.particles);
+    assert_int_equal(ascc_particles_restore(w.particles, memory, size), ASCC_OK);
+    assert_true(ascc_particles_hash(w.particles) != want);
+    run(&w, down, 25);
+    assert_true(ascc_particles_hash(w.particles) == want);
+    free(memory);
+    close_world(&w);
+}
+
+/* ---- Units and forces ---- */
+
+static void a_host_in_centimetres_gets_the_same_motion(void **state)
+{
+    (void)state;
+    const world_options metres = {.dimension = 3, .threads = 1, .walls = true};
+    world_options centimetres = metres;
+    centimetres.unit = 0.01;
+    world a = open_world(&metres), b = open_world(&centimetres);
+    const double down_cm[3] = {0.0, -981.0, 0.0};
+    run(&a, down, 20);
+    run(&b, down_cm, 20);
+    const size_t n = ascc_particles_count(a.particles, ASCC_FLUID) * 3;
+    for (size_t k = 0; k < n; k++)
+        assert_true(fabs(a.particles->position[k] - b.particles->position[k] * 0.01) < 1e-6);
+    close_world(&a);
+    close_world(&b);
+}
+
+static void the_models_gravity_is_the_default_in_the_hosts_unit(void **state)
+{
+    (void)state;
+    world_options o = {.dimension = 3, .threads = 1, .unit = 0.01};
+    world w = open_world(&o);
+    ascc_model_info info = {.size = sizeof info};
+    assert_int_equal(ascc_model_get_info(w.model, &info), ASCC_OK);
+    assert_int_equal(ascc_step_run(w.step, w.particles, NULL, 1), ASCC_OK);
+    const ascc_step_statistics s = statistics_of(&w);
+    ascc_measures m = {.size = sizeof m};
+    assert_int_equal(ascc_particles_measure(w.particles, &m), ASCC_OK);
+    const double q = ascc_particles_momentum_quantum(w.particles);
+    for (int c = 0; c < 3; c++)
+        assert_true(fabs((double)s.external_impulse[c] * q / m.mass -
+                         info.gravity[c] * 100.0 * info.time_step) < 1e-6);
+    close_world(&w);
+}
+
+static void free_fall_follows_gravity_and_acceleration(void **state)
+{
+    (void)state;
+    const world_options o = {.dimension = 3, .threads = 1};
+    world w = open_world(&o);
+    const double x[6] = {0, 0, 0, 5, 0, 0}; /* apart: no pair */
+    const float push[8] = {1.0f, 2.0f, 3.0f, 99.0f, 0.0f, 0.0f, -4.0f, 99.0f};
+    const ascc_const_array position = {.data = x, .scalar = ASCC_DOUBLE};
+    const ascc_const_array acceleration = {.data = push, .stride = 4 * sizeof(float)};
+    assert_int_equal(ascc_particles_clear(w.particles, ASCC_FLUID), ASCC_OK);
+    assert_int_equal(ascc_particles_add_fluid(w.particles, 2, &position, NULL, NULL, NULL),
+                     ASCC_OK);
+    ascc_model_info info = {.size = sizeof info};
+    assert_int_equal(ascc_model_get_info(w.model, &info), ASCC_OK);
+    const ascc_forces forces = {
+        .size = sizeof forces, .gravity = down, .acceleration = &acceleration};
+    assert_int_equal(ascc_step_run(w.step, w.particles, &forces, 50), ASCC_OK);
+    double v[6];
+    const ascc_array out = {.data = v, .scalar = ASCC_DOUBLE};
+    assert_int_equal(ascc_particles_get(w.particles, ASCC_FLUID, ASCC_VELOCITY, 0, 2, &out),
+                     ASCC_OK);
+    const double time = 50.0 * info.time_step;
+    assert_true(fabs(v[0] - time) < 1e-6 && fabs(v[1] + 7.81 * time) < 1e-6);
+    assert_true(fabs(v[3]) < 1e-9 && fabs(v[4] + 9.81 * time) < 1e-6);
+    assert_true(fabs(v[5] + 4.0 * time) < 1e-6);
+    close_world(&w);
+}
+
+/* ---- Bad input: an error, and nothing has changed ---- */
+
+static void check_refused(world *w, const ascc_forces *forces, ascc_status status, const char *word)
+{
+    const uint64_t before = ascc_particles_hash(w->particles);
+    assert_int_equal(ascc_step_run(w->step, w->particles, forces, 3), status);
+    assert_true(ascc_particles_hash(w->particles) == before);
+    if (!strstr(ascc_step_message(w->step), word))
+        fail_msg("the message does not say %s: %s", word, ascc_step_message(w->step));
+    assert_int_equal(statistics_of(w).steps, 0);
+}
+
+static void bad_forces_are_refused(void **state)
+{
+    (void)state;
+    const world_options o = {.dimension = 3, .threads = 1};
+    world w = open_world(&o);
+    const double bad[3] = {0.0, NAN, 0.0};
+    ascc_forces forces = {.size = sizeof forces, .gravity = bad};
+    check_refused(&w, &forces, ASCC_ERROR_NOT_FINITE, "gravity");
+    float push[300 * 3] = {0};
+    push[100] = INFINITY;
+    const ascc_const_array acceleration = {.data = push};
+    forces = (ascc_forces){.size = sizeof forces, .acceleration = &acceleration};
+    check_refused(&w, &forces, ASCC_ERROR_NOT_FINITE, "acceleration");
+    const double huge[3] = {1e300, 0.0, 0.0};
+    forces = (ascc_forces){.size = sizeof forces, .gravity = huge};
+    check_refused(&w, &forces, ASCC_ERROR_RANGE, "momentum");
+    forces = (ascc_forces){.size = 3};
+    check_refused(&w, &forces, ASCC_ERROR_ARGUMENT, "size");
+    assert_int_equal(ascc_step_run(w.step, w.particles, NULL, -1), ASCC_ERROR_ARGUMENT);
+    assert_int_equal(ascc_step_run(w.step, NULL, NULL, 1), ASCC_ERROR_ARGUMENT);
+    assert_int_equal(ascc_step_run(NULL, w.particles, NULL, 1), ASCC_ERROR_ARGUMENT);
+    close_world(&w);
+}
+
+static void bad_step_options_are_refused(void **state)
+{
+    (void)state;
+    const world_options o = {.dimension = 2, .threads = 1};
+    world w = open_world(&o);
+    const ascc_step_options bad[] = {{.size = sizeof(ascc_step_options), .time_step = -1.0},
+                                     {.size = sizeof(ascc_step_options), .time_step = NAN},
+                                     {.size = sizeof(ascc_step_options), .length_unit = -2.0},
+                                     {.size = sizeof(ascc_step_options), .max_neighbors = -1},
+                                     {.size = 1}};
+    for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
+        ascc_step *step = (ascc_step *)&w;
+        assert_int_equal(ascc_step_create(w.context, w.model, &bad[i], &step), ASCC_ERROR_ARGUMENT);
+        assert_null(step);
+    }
+    ascc_step *step;
+    assert_int_equal(ascc_step_create(w.context, NULL, NULL, &step), ASCC_ERROR_ARGUMENT);
+    assert_int_equal(ascc_step_create(NULL, w.model, NULL, &step), ASCC_ERROR_ARGUMENT);
+    close_world(&w);
+}
+
+static void a_model_of_another_dimension_is_refused(void **state)
+{
+    (void)state;
+    const world_options two = {.dimension = 2, .threads = 1},
+                        three = {.dimension = 3, .threads = 1};
+    world a = open_world(&two), b = open_world(&three);
+    assert_int_equal(ascc_step_run(a.step, b.particles, NULL, 1), ASCC_ERROR_MISMATCH);
+    close_world(&a);
+    close_world(&b);
+}
+
+static void a_handle_of_another_kind_is_refused(void **state)
+{
+    (void)state;
+    const world_options o = {.dimension = 2, .threads = 1};
+    world w = open_world(&o);
+    assert_int_equal(ascc_step_run((ascc_step *)w.particles, w.particles, NULL, 1),
+                     ASCC_ERROR_ARGUMENT);
+    assert_int_equal(ascc_step_run(w.step, (ascc_particles *)w.step, NULL, 1), ASCC_ERROR_ARGUMENT);
+    close_world(&w);
+}
+
+static void set_all_positions(world *w, const double at[3], double spread)
+{
+    const size_t d = (size_t)w->particles->dimension;
+    for (size_t i = 0; i < w->particles->fluid_count; i++)
+        for (size_t c = 0; c < d; c++)
+            w->particles->position[i * d + c] = at[c] + spread * (double)(i % 2);
+}
+
+static void all_particles_at_one_point_feel_no_pair(void **state)
+{
+    (void)state;
+    const world_options o = {.dimension = 3, .threads = 1, .random_network = true};
+    world w = open_world(&o);
+    const double at[3] = {0.1, -0.2, 0.3};
+    set_all_positions(&w, at, 0.0);
+    memset(w.particles->momentum, 0, w.particles->fluid_count * 3 * sizeof(int64_t));
+    const uint64_t before = ascc_particles_hash(w.particles);
+    run(&w, no_gravity, 1);
+    assert_true(ascc_particles_hash(w.particles) == before);
+    close_world(&w);
+}
+
+static void particles_a_million_radii_apart_step_apart(void **state)
+{
+    (void)state;
+    const world_options o = {.dimension = 3, .threads = 1, .random_network = true};
+    world w = open_world(&o);
+    const double at[3] = {0.0, 0.0, 0.0};
+    set_all_positions(&w, at, 1e5);
+    run(&w, no_gravity, 2);
+    const double out[3] = {1e13, 0.0, 0.0};
+    set_all_positions(&w, out, -2e13);
+    const ascc_forces forces = {.size = sizeof forces, .gravity = no_gravity};
+    check_refused(&w, &forces, ASCC_ERROR_RANGE, "");
+    close_world(&w);
+}
+
+static void no_particles_and_one_particle_step(void **state)
+{
+    (void)state;
+    for (int32_t dimension = 2; dimension <= 3; dimension++) {
+        const world_options o = {.dimension = dimension, .threads = 2, .random_network = true};
+        world w = open_world(&o);
+        const double x[3] = {0.3, 0.3, 0.3};
+        const ascc_const_array position = {.data = x, .scalar = ASCC_DOUBLE};
+        assert_int_equal(ascc_particles_clear(w.particles, ASCC_FLUID), ASCC_OK);
+        run(&w, no_gravity, 2);
+        assert_int_equal(ascc_particles_add_fluid(w.particles, 1, &position, NULL, NULL, NULL),
+                         ASCC_OK);
+        const uint64_t before = ascc_particles_hash(w.particles);
+        run(&w, no_gravity, 2);
+        assert_true(ascc_particles_hash(w.particles) == before);
+        close_world(&w);
+    }
+}
+
+static void a_crowd_beyond_max_neighbors_is_an_error(void **state)
+{
+    (void)state;
+    const world_options o = {.dimension = 3, .threads = 1};
+    world w = open_world(&o);
+    ascc_step_destroy(&w.step);
+    const ascc_step_options options = {.size = sizeof options, .max_neighbors = 5};
+    assert_int_equal(ascc_step_create(w.context, w.model, &options, &w.step), ASCC_OK);
+    check_refused(&w, NULL, ASCC_ERROR_LIMIT, "max_neighbors = 5");
+    close_world(&w);
+}
+
+static void a_jump_beyond_max_displacement_is_an_error(void **state)
+{
+    (void)state;
+    const world_options o = {.dimension = 3, .threads = 1};
+    world w = open_world(&o);
+    ascc_step_destroy(&w.step);
+    const ascc_step_options options = {.size = sizeof options, .max_displacement = 1e-4};
+    assert_int_equal(ascc_step_create(w.context, w.model, &options, &w.step), ASCC_OK);
+    check_refused(&w, NULL, ASCC_ERROR_RANGE, "max_displacement");
+    close_world(&w);
+}
+
+static void values_too_large_for_an_impulse_are_an_error(void **state)
+{
+    (void)state;
+    const world_options o = {.dimension = 3, .threads = 1, .random_network = true};
+    world w = open_world(&o);
+    w.particles->quantum = 1e-300; /* any impulse is beyond what integers of this quantum hold */
+    memset(w.particles->momentum, 0, w.particles->fluid_count * 3 * sizeof(int64_t));
+    const ascc_forces forces = {.size = sizeof forces, .gravity = no_gravity};
+    check_refused(&w, &forces, ASCC_ERROR_RANGE, "impulse");
+    close_world(&w);
+}
+
+/* ---- Memory ---- */
+
+typedef struct counter {
+    size_t calls, live;
+    size_t fail_at; /* this call and all later ones fail; 0 = none */
+} counter;
+
+static void *count_allocate(void *user, size_t size, size_t alignment)
+{
+    counter *c = user;
+    c->calls++;
+    if (c->fail_at && c->calls >= c->fail_at)
+        return NULL;
+    c->live += size;
+    return aligned_alloc(alignment, (size + alignment - 1) / alignment * alignment);
+}
+
+static void count_release(void *user, void *memory, size_t size)
+{
+    counter *c = user;
+    c->live -= size;
+    free(memory);
+}
+
+static void *count_reallocate(void *user, void *memory, size_t old_size, size_t size,
+                              size_t alignment)
+{
+    void *to = count_allocate(user, size, alignment);
+    if (!to)
+        return NULL;
+    memcpy(to, memory, old_size < size ? old_size : size);
+    count_release(user, memory, old_size);
+    return to;
+}
+
+static world_options counted(counter *c, world_options o)
+{
+    o.context = (ascc_context_options){.thread_count = 2,
+                                       .allocate = count_allocate,
+                                       .reallocate = count_reallocate,
+                                       .release = count_release,
+                                       .user = c};
+    return o;
+}
+
+static void a_steady_step_allocates_nothing(void **state)
+{
+    (void)state;
+    for (int random = 0; random < 2; random++) {
+        counter c = {0};
+        const world_options o =
+            counted(&c, (world_options){.dimension = 3, .walls = true, .random_network = random});
+        world w = open_world(&o);
+        run(&w, down, 6); /* the scene settles into its memory */
+        ascc_const_array still = {.data = w.particles->position, .scalar = ASCC_DOUBLE};
+        const size_t n = w.particles->fluid_count;
+        double *copy = malloc(n * 3 * sizeof *copy);
+        memcpy(copy, w.particles->position, n * 3 * sizeof *copy);
+        still.data = copy;
+        const size_t before = c.calls;
+        for (int k = 0; k < 10; k++) { /* the same scene again and again */
+            assert_int_equal(
+                ascc_particles_set(w.particles, ASCC_FLUID, ASCC_POSITION, 0, n, &still), ASCC_OK);
+            memset(w.particles->momentum, 0, n * 3 * sizeof(int64_t));
+            run(&w, no_gravity, 1);
+        }
+        const size_t first = c.calls - before;
+        for (int k = 0; k < 10; k++) {
+            assert_int_equal(
+                ascc_particles_set(w.particles, ASCC_FLUID, ASCC_POSITION, 0, n, &still), ASCC_OK);
+            memset(w.particles->momentum, 0, n * 3 * sizeof(int64_t));
+            run(&w, no_gravity, 1);
+        }
+        assert_int_equal(c.calls - before - first, 0);
+        free(copy);
+        close_world(&w);
+        assert_int_equal(c.live, 0);
+    }
+}
+
+static void each_failing_allocation_leaves_the_particles_as_they_were(void **state)
+{
+    (void)state;
+    counter c = {0};
+    const world_options o =
+        counted(&c, (world_options){.dimension = 3, .walls = true, .random_network = true});
+    world w = open_world(&o);
+    const uint64_t before = ascc_particles_hash(w.particles);
+    size_t failures = 0;
+    for (size_t n = 1;; n++) {
+        c.calls = 0;
+        c.fail_at = n;
+        ascc_step *step = NULL;
+        const ascc_forces forces = {.size = sizeof forces, .gravity = down};
+        ascc_status status = ascc_step_create(w.context, w.model, NULL, &step);
+        if (status == ASCC_OK)
+            status = ascc_step_run(step, w.particles, &forces, 1);
+        c.fail_at = 0;
+        ascc_step_destroy(&step);
+        if (status == ASCC_OK)
+            break;
+        assert_int_equal(status, ASCC_ERROR_MEMORY);
+        assert_true(ascc_particles_hash(w.particles) == before);
+        failures++;
+    }
+    assert_true(failures > 30);
+    close_world(&w);
+    assert_int_equal(c.live, 0);
+}
+
+/* ---- What a step tells ---- */
+
+static void statistics_tell_what_happened(void **state)
+{
+    (void)state;
+    const world_options o = {.dimension = 3, .threads = 1, .walls = true, .random_network = true};
+    world w = open_world(&o);
+    run(&w, down, 3);
+    const ascc_step_statistics s = statistics_of(&w);
+    assert_int_equal(s.steps, 3);
+    assert_int_equal(s.level_count, 2);
+    assert_true(s.level_points[0] >= w.particles->fluid_count);
+    assert_true(s.level_points[1] > 0 && s.level_points[1] < s.level_points[0]);
+    assert_true(s.max_neighbors > 5 && s.neighbor_count > s.pair_count);
+    assert_true(s.scratch_size > 10000);
+    const double sum = s.seconds_prepare + s.seconds_hierarchy + s.seconds_search +
+                       s.seconds_network + s.seconds_last_layer + s.seconds_commit;
+    assert_true(sum > 0.5 * s.seconds_total && sum <= 1.0001 * s.seconds_total);
+    close_world(&w);
+}
+
+static void measures_of_a_lattice_at_rest_are_those_of_rest(void **state)
+{
+    (void)state;
+    const world_options o = {.dimension = 3, .threads = 1};
+    world w = open_world(&o);
+    assert_int_equal(ascc_particles_clear(w.particles, ASCC_FLUID), ASCC_OK);
+    double x[7 * 7 * 7 * 3];
+    for (int i = 0; i < 343; i++) {
+        x[i * 3] = i % 7 * spacing;
+        x[i * 3 + 1] = i / 7 % 7 * spacing;
+        x[i * 3 + 2] = i / 49 * spacing;
+    }
+    const ascc_const_array position = {.data = x, .scalar = ASCC_DOUBLE};
+    assert_int_equal(ascc_particles_add_fluid(w.particles, 343, &position, NULL, NULL, NULL),
+                     ASCC_OK);
+    ascc_measures m = {.size = sizeof m};
+    assert_int_equal(ascc_particles_measure(w.particles, &m), ASCC_OK);
+    assert_true(fabs(m.max_density - 1.0) < 1e-6);
+    assert_true(m.mean_density < 1.0 && m.mean_density > 0.6);
+    assert_true(fabs(m.min_distance - spacing) < 1e-6);
+    assert_int_equal(m.close_count, 0);
+    assert_true(fabs(m.mass - 343 * 0.125) < 1e-9);
+    assert_true(m.kinetic_energy == 0.0 && m.max_speed == 0.0);
+    close_world(&w);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(momentum_is_the_same_integer_after_a_collision),
+        cmocka_unit_test(fluid_and_wall_impulses_sum_to_the_external_impulse),
+        cmocka_unit_test(radial_projection_conserves_angular_momentum),
+        cmocka_unit_test(pair_impulses_are_along_the_line_with_radial_projection),
+        cmocka_unit_test(bits_do_not_depend_on_threads_cpu_or_order),
+        cmocka_unit_test(bits_do_not_depend_on_the_hosts_job_system),
+        cmocka_unit_test(a_far_particle_changes_no_bit_of_the_others),
+        cmocka_unit_test(many_steps_at_once_equal_single_steps),
+        cmocka_unit_test(a_restored_run_goes_on_bit_for_bit),
+        cmocka_unit_test(a_host_in_centimetres_gets_the_same_motion),
+        cmocka_unit_test(the_models_gravity_is_the_default_in_the_hosts_unit),
+        cmocka_unit_test(free_fall_follows_gravity_and_acceleration),
+        cmocka_unit_test(bad_forces_are_refused),
+        cmocka_unit_test(bad_step_options_are_refused),
+        cmocka_unit_test(a_model_of_another_dimension_is_refused),
+        cmocka_unit_test(a_handle_of_another_kind_is_refused),
+        cmocka_unit_test(all_particles_at_one_point_feel_no_pair),
+        cmocka_unit_test(particles_a_million_radii_apart_step_apart),
+        cmocka_unit_test(no_particles_and_one_particle_step),
+        cmocka_unit_test(a_crowd_beyond_max_neighbors_is_an_error),
+        cmocka_unit_test(a_jump_beyond_max_displacement_is_an_error),
+        cmocka_unit_test(values_too_large_for_an_impulse_are_an_error),
+        cmocka_unit_test(a_steady_step_allocates_nothing),
+        cmocka_unit_test(each_failing_allocation_leaves_the_particles_as_they_were),
+        cmocka_unit_test(statistics_tell_what_happened),
+        cmocka_unit_test(measures_of_a_lattice_at_rest_are_those_of_rest),
+    };
+    return cmocka_run_group_tests_name("step", tests, NULL, NULL);
+}
