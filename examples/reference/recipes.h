@@ -20,6 +20,7 @@ typedef struct recipe_options {
 } recipe_options;
 
 typedef struct recipe {
+    uint64_t number;
     int32_t dimension, frames;
     double spacing, frame; /* m; s between frames */
     double gravity[3];
