@@ -99,23 +99,28 @@ static void look_at_motion(work *w, size_t frame)
     w->found->energy_last = energy;
 }
 
-/* A particle is out when it is half a spacing behind the wall point nearest to it, or outside the
- * walls' bounds by as much. */
-static bool is_out(const work *w, size_t i, double nearest, size_t wall)
+/* How far particle i is in front of wall point j, m. */
+static double height_above(const work *w, size_t i, size_t j)
 {
     const inspect_input *in = w->input;
-    const double *x = w->point + i * 3;
-    const double margin = 0.5 * in->spacing;
-    for (int c = 0; c < in->dimension; c++)
-        if (x[c] < w->low[c] - margin || x[c] > w->high[c] + margin)
-            return true;
-    if (!isfinite(nearest))
-        return false;
+    const float *normal = in->normal + (j - in->count) * (size_t)in->dimension;
     double above = 0.0;
-    for (size_t c = 0; c < (size_t)in->dimension; c++)
-        above += (x[c] - w->point[(in->count + wall) * 3 + c]) *
-                 in->normal[wall * (size_t)in->dimension + c];
-    return above < -margin;
+    for (int c = 0; c < in->dimension; c++)
+        above += (w->point[i * 3 + (size_t)c] - w->point[j * 3 + (size_t)c]) * normal[c];
+    return above;
+}
+
+/* A particle is out when it is half a spacing behind every wall point within the radius (one is not
+ * enough: at an edge the normals differ), or outside the walls' bounds by as much. */
+static bool is_out(const work *w, size_t i, double height)
+{
+    const double margin = 0.5 * w->input->spacing;
+    for (int c = 0; c < w->input->dimension; c++) {
+        const double x = w->point[i * 3 + (size_t)c];
+        if (x < w->low[c] - margin || x > w->high[c] + margin)
+            return true;
+    }
+    return isfinite(height) && height < -margin;
 }
 
 typedef struct frame_sums {
@@ -127,8 +132,8 @@ static void look_at_particle(work *w, size_t i, double rest, frame_sums *sums)
     const inspect_input *in = w->input;
     const near_lists *l = w->lists;
     const double scale = 1.0 / (in->spacing * in->spacing);
-    double density = poly6(0.0), nearest_wall = INFINITY;
-    size_t wall = 0, half = 0;
+    double density = poly6(0.0), height = -INFINITY;
+    size_t half = 0;
     bool close = false;
     for (uint32_t k = 0; k < l->count[i]; k++) {
         const size_t j = l->index[l->start[i] + k];
@@ -139,10 +144,7 @@ static void look_at_particle(work *w, size_t i, double rest, frame_sums *sums)
         }
         square *= scale;
         if (j >= in->count) {
-            if (square < nearest_wall) {
-                nearest_wall = square;
-                wall = j - in->count;
-            }
+            height = fmax(height, height_above(w, i, j));
             continue;
         }
         density += poly6(square);
@@ -153,7 +155,7 @@ static void look_at_particle(work *w, size_t i, double rest, frame_sums *sums)
     sums->clumps += half >= 2;
     w->density[i] = density / rest;
     if (in->walls)
-        w->out[i] |= is_out(w, i, nearest_wall, wall);
+        w->out[i] |= is_out(w, i, height);
 }
 
 static int descending(const void *a, const void *b)

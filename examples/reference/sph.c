@@ -18,7 +18,7 @@
 #include "near.h"
 
 #define PI 3.14159265358979323846
-#define SPRAY 0.5    /* share of the support below which a particle is on its own */
+#define CONTACT 0.7  /* spacings; undisturbed fluid keeps farther apart */
 #define SURFACE 0.85 /* share below which it is at the surface */
 
 struct sph {
@@ -29,10 +29,10 @@ struct sph {
     double (*acceleration)[3];     /* [fluid] */
     double (*gradient)[3];         /* [capacity] of the density, renormalised */
     double (*shift)[3];            /* [fluid] */
-    double *trace;                 /* [fluid] 1 where neighbours are on all sides */
     double *rate;                  /* [fluid] of the density */
     double mass, length, support, stiffness, normalisation, slope, spacing_weight;
-    bool ready; /* accelerations belong to the positions */
+    double contact, push; /* distance below which pairs push each other, and the force, N */
+    bool ready;           /* accelerations belong to the positions */
     sph_totals totals;
     ascc_message message;
 };
@@ -72,6 +72,8 @@ static void derive(sph *s)
         o->dimension == 2 ? 7.0 / (4.0 * PI * h * h) : 21.0 / (16.0 * PI * h * h * h);
     s->slope = -5.0 * s->normalisation / (h * h);
     s->spacing_weight = wendland(1.0 / o->smoothing);
+    s->contact = CONTACT * o->spacing;
+    s->push = 0.5 * s->mass * o->sound_speed * o->sound_speed / o->spacing;
 }
 
 sph *sph_create(const sph_options *options)
@@ -105,7 +107,6 @@ void sph_destroy(sph **solver)
     free(s->acceleration);
     free(s->gradient);
     free(s->shift);
-    free(s->trace);
     free(s->rate);
     free(s);
     *solver = NULL;
@@ -134,7 +135,6 @@ static ascc_status reserve(sph *s, size_t count)
         !grow((void **)&s->gradient, count, sizeof *s->gradient) ||
         !grow((void **)&s->acceleration, count, sizeof *s->acceleration) ||
         !grow((void **)&s->shift, count, sizeof *s->shift) ||
-        !grow((void **)&s->trace, count, sizeof *s->trace) ||
         !grow((void **)&s->rate, count, sizeof *s->rate))
         return ascc_fail(&s->message, ASCC_ERROR_MEMORY, "no memory for %zu particles", count);
     s->capacity = count;
@@ -388,6 +388,8 @@ INLINE double pair_force(const sph *s, const sph_particle *a, const sph_particle
         force +=
             2.0 * s->mass * s->mass / both * mu * (linear - o->impact_viscosity * mu) * p->slope;
     }
+    if (p->distance < s->contact && p->distance > 0.0) /* falls off to 0 at the contact distance */
+        force += s->push * (1.0 / p->distance - 1.0 / s->contact);
     return force;
 }
 
@@ -469,7 +471,6 @@ INLINE void force_row(sph *s, size_t i, const int d)
     }
     for (int c = 0; c < d; c++)
         s->acceleration[i][c] = m.force[c] / s->mass + s->options.gravity[c];
-    s->trace[i] = m.trace / d;
     solve_gradient(&m, d, s->gradient[i]);
     for (int c = 0; c < d; c++) /* not at the free surface */
         s->shift[i][c] = m.trace > SURFACE * d ? m.shift[c] : 0.0;
@@ -567,17 +568,6 @@ static void shift(sph *s, double dt)
     }
 }
 
-/* A particle that has left the others keeps the density of the last time it saw them, which a wall
- * would then have to make up for: spray starts again from rest density. */
-static void advance_density(sph *s, double dt)
-{
-    const double rest = s->options.rest_density;
-    for (size_t i = 0; i < s->fluid; i++) {
-        const double lowest = s->trace[i] < SPRAY ? rest : 0.5 * rest;
-        s->state[i].density = fmax(lowest, s->state[i].density + dt * s->rate[i]);
-    }
-}
-
 static ascc_status step(sph *s, double dt)
 {
     kick(s, 0.5 * dt);
@@ -586,7 +576,8 @@ static ascc_status step(sph *s, double dt)
     if (status != ASCC_OK)
         return status;
     near_run(s->lists, s->fluid, continuity, s);
-    advance_density(s, dt);
+    for (size_t i = 0; i < s->fluid; i++)
+        s->state[i].density += dt * s->rate[i];
     drift(s, 0.5 * dt);
     shift(s, dt);
     const ascc_status evaluated = evaluate(s);
