@@ -18,7 +18,6 @@
 #include "near.h"
 
 #define PI 3.14159265358979323846
-#define CONTACT 0.7  /* spacings; undisturbed fluid keeps farther apart */
 #define SURFACE 0.85 /* share below which it is at the surface */
 
 struct sph {
@@ -60,6 +59,7 @@ static void derive(sph *s)
     set_default(&o->density_diffusion, 0.1);
     set_default(&o->impact_viscosity, 1.5);
     set_default(&o->shifting, 1.0);
+    set_default(&o->contact, 0.7);
     set_default(&o->courant, 0.5);
     set_default(&o->skin, 0.3);
     const double h = o->smoothing * o->spacing;
@@ -72,7 +72,7 @@ static void derive(sph *s)
         o->dimension == 2 ? 7.0 / (4.0 * PI * h * h) : 21.0 / (16.0 * PI * h * h * h);
     s->slope = -5.0 * s->normalisation / (h * h);
     s->spacing_weight = wendland(1.0 / o->smoothing);
-    s->contact = CONTACT * o->spacing;
+    s->contact = o->contact * o->spacing;
     s->push = 0.5 * s->mass * o->sound_speed * o->sound_speed / o->spacing;
 }
 

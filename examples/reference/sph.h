@@ -25,6 +25,7 @@ typedef struct sph_options {
     double impact_viscosity;     /* beta of Monaghan, against impacts; 0 = 1.5, negative = none */
     double density_diffusion;    /* delta; 0 = 0.1, negative = none */
     double shifting;      /* times the displacement of Sun et al. 2017; 0 = 1, negative = none */
+    double contact;       /* spacings below which pairs push each other; 0 = 0.7, negative = none */
     int32_t keep_tension; /* 0 = negative pressure is clipped, 1 = kept */
     int32_t reserved;
     double period[3]; /* m; box [0, period) repeats, then without walls; 0 = does not */
