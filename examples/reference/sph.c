@@ -555,7 +555,7 @@ static void shift(sph *s, double dt)
 {
     const double most = 0.05 * s->options.spacing;
     const double factor =
-        s->options.shifting * dt * 2.0 * s->length *
+        s->options.shifting * dt * 4.0 * s->length *
         fastest(s, (const double(*)[3])s->state->velocity, sizeof(sph_particle) / sizeof(double));
     for (size_t i = 0; factor > 0.0 && i < s->fluid; i++) {
         double square = 0.0;

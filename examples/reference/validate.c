@@ -62,7 +62,8 @@ static void draw(const report *r, const char *name, const char *labels, const ch
         return;
     for (int k = 0; k < 2; k++)
         fprintf(pipe,
-                "set terminal %s\nset output '%s/figures/%s.%s'\nDATA='%s/figures/%s.dat'\n"
+                "set fit quiet logfile '/dev/null'\nset terminal %s\nset output "
+                "'%s/figures/%s.%s'\nDATA='%s/figures/%s.dat'\n"
                 "set grid\nset key bottom right\n%s\n%s\nunset output\n",
                 k ? "pngcairo size 800,500 font 'sans,11'" : "svg size 800,500 font 'sans,13'",
                 r->docs, name, k ? "png" : "svg", r->docs, name, labels, plot);
@@ -285,6 +286,7 @@ static bool run_vortex(report *r, int n, FILE *data, vortex *v)
                                  .sound_speed = 10.0,
                                  .viscosity = nu,
                                  .impact_viscosity = -1.0,
+                                 .contact = -1.0,
                                  .keep_tension = 1,
                                  .period = {1.0, 1.0, 0.0}};
     double *position = malloc(2 * count * sizeof *position),
