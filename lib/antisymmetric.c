@@ -25,7 +25,7 @@ typedef struct pair_job {
 typedef struct batch {
     size_t count;
     uint32_t neighbor[BATCH];
-    float x[BATCH], y[BATCH], z[BATCH], window[BATCH];
+    float geometry[ASCC_GEOMETRY_ARRAYS * BATCH];
     float term[BATCH][4];
 } batch;
 
@@ -88,11 +88,12 @@ static void flush(pair_job *job, size_t i, batch *b)
     const ascc_plan *plan = run->network->plan;
     const size_t d = (size_t)plan->dimension, a = ascc_padded(plan->output.inputs);
     const float *value = output_values(run);
-    const ascc_pairs pairs = {b->x, b->y, b->z, {0}};
-    run->tools->kernels->pair_terms(
-        &pairs, plan->output.filter.window == ASCC_WINDOW_NONE ? NULL : b->window, b->neighbor,
-        b->count, value + i * a, value, a, plan->output.filter.cells,
-        run->network->term_weight[plan->term_count], d, b->term[0]);
+    const ascc_filter *filter = &plan->output.filter;
+    const ascc_geometry g =
+        ascc_network_geometry(run, job->rows, filter, i, b->neighbor, b->count, b->geometry, BATCH);
+    run->tools->kernels->pair_terms(&g.pairs, g.window, b->neighbor, b->count, value + i * a, value,
+                                    a, filter->cells, run->network->term_weight[plan->term_count],
+                                    d, b->term[0]);
     for (size_t k = 0; k < b->count; k++) {
         const size_t j = b->neighbor[k];
         double impulse[3];
@@ -115,7 +116,6 @@ static void evaluate_row(pair_job *job, size_t i, batch *b)
 {
     const ascc_rows *rows = job->rows;
     const size_t start = rows->start[i];
-    const float *window = rows->pairs.window[job->run->network->plan->output.filter.window];
     for (size_t k = start; k < start + rows->count[i]; k++) {
         const uint32_t j = rows->neighbor[k];
         if (job->fluid[j] && j <= i)
@@ -125,10 +125,6 @@ static void evaluate_row(pair_job *job, size_t i, batch *b)
             rows->source->low[2][j] == rows->query->low[2][i])
             continue; /* coincident: no direction, no impulse */
         b->neighbor[b->count] = j;
-        b->x[b->count] = rows->pairs.x[k];
-        b->y[b->count] = rows->pairs.y[k];
-        b->z[b->count] = rows->pairs.z[k];
-        b->window[b->count] = window ? window[k] : 1.0f;
         if (++b->count == BATCH)
             flush(job, i, b);
     }

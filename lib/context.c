@@ -1,70 +1,119 @@
-/* Context: allocator, log, workers and kernels under one count. SPDX-License-Identifier: MIT */
+/* Ties allocator, log, workers and kernel table together; counted, so that handles may be destroyed
+ * in any order. SPDX-License-Identifier: MIT */
 #include "context.h"
 
 #include <pthread.h>
 #include <stdatomic.h>
-#include <stdio.h>
 #include <string.h>
 
 #define MAX_THREADS 1024
-#define KNOWN_CPU (ASCC_CPU_AVX2 | ASCC_CPU_AVX512 | ASCC_CPU_NEON)
+#define KNOWN_CPU_BITS (ASCC_CPU_AVX2 | ASCC_CPU_AVX512 | ASCC_CPU_NEON)
 
-_Static_assert(sizeof(void *) != 8 || sizeof(ascc_context_options) == 72, "released layout");
+/* The first released layout. */
+#define FIRST_OPTIONS_SIZE sizeof(ascc_context_options)
+_Static_assert(sizeof(void *) != 8 || FIRST_OPTIONS_SIZE == 72, "layout is part of the ABI");
 
 struct ascc_context_shared {
-    atomic_int references;
+    atomic_size_t references;
     pthread_mutex_t lock; /* of message */
     ascc_message message;
 };
 
-static bool options_valid(const ascc_context_options *o)
+/* One block holds both. */
+typedef struct context_block {
+    ascc_context context;
+    struct ascc_context_shared shared;
+} context_block;
+
+static bool is_context(const ascc_context *context)
 {
-    const int memory = !!o->allocate + !!o->reallocate + !!o->release;
-    return o->thread_count >= 0 && o->thread_count <= MAX_THREADS && (memory == 0 || memory == 3) &&
-           !o->enqueue == !o->finish && !(o->cpu_disable & ~KNOWN_CPU);
+    return context != NULL && context->magic == ASCC_CONTEXT_MAGIC;
+}
+
+static ascc_status check_options(const ascc_context_options *options, ascc_message *message)
+{
+    if (options->thread_count < 0 || options->thread_count > MAX_THREADS)
+        return ascc_fail(message, ASCC_ERROR_ARGUMENT,
+                         "context: thread_count is %ld, not in [0, %d]",
+                         (long)options->thread_count, MAX_THREADS);
+    if ((options->cpu_disable & ~KNOWN_CPU_BITS) != 0)
+        return ascc_fail(message, ASCC_ERROR_ARGUMENT,
+                         "context: cpu_disable is 0x%lx, a bit of it does not exist",
+                         (unsigned long)options->cpu_disable);
+    const int memory =
+        (options->allocate != NULL) + (options->reallocate != NULL) + (options->release != NULL);
+    if (memory != 0 && memory != 3)
+        return ascc_fail(message, ASCC_ERROR_ARGUMENT,
+                         "context: allocate, reallocate and release go together, %d given", memory);
+    if ((options->enqueue != NULL) != (options->finish != NULL))
+        return ascc_fail(message, ASCC_ERROR_ARGUMENT,
+                         "context: enqueue and finish go together, one given");
+    return ASCC_OK;
+}
+
+static ascc_status make(const ascc_context_options *options, ascc_context **context,
+                        ascc_message *message)
+{
+    ascc_allocator allocator = ascc_allocator_default();
+    if (options->allocate != NULL)
+        allocator = (ascc_allocator){options->allocate, options->reallocate, options->release,
+                                     options->user};
+    context_block *const block = ascc_allocate(&allocator, 1, sizeof *block);
+    if (block == NULL)
+        return ascc_fail(message, ASCC_ERROR_MEMORY, "context: out of memory");
+    memset(block, 0, sizeof *block);
+    if (pthread_mutex_init(&block->shared.lock, NULL) != 0) {
+        ascc_release(&allocator, block, 1, sizeof *block);
+        return ascc_fail(message, ASCC_ERROR_MEMORY, "context: no lock");
+    }
+    atomic_init(&block->shared.references, 1);
+
+    ascc_context *const made = &block->context;
+    made->allocator = allocator;
+    made->log = options->log;
+    made->user = options->user;
+    made->cpu = ascc_kernels_available() & ~options->cpu_disable;
+    made->shared = &block->shared;
+    ascc_kernels_select(&made->kernels, made->cpu);
+
+    const int32_t threads = options->thread_count == 0 ? 1 : options->thread_count;
+    const ascc_status status = ascc_workers_create(&allocator, threads, options->enqueue,
+                                                   options->finish, options->user, &made->workers);
+    if (status != ASCC_OK) {
+        pthread_mutex_destroy(&block->shared.lock);
+        ascc_release(&allocator, block, 1, sizeof *block);
+        return ascc_fail(message, status, "context: %ld threads could not be started",
+                         (long)threads);
+    }
+    made->magic = ASCC_CONTEXT_MAGIC;
+    *context = made;
+    return ASCC_OK;
 }
 
 ascc_status ascc_context_create(const ascc_context_options *options, ascc_context **context)
 {
-    if (!context)
+    if (context == NULL)
         return ASCC_ERROR_ARGUMENT;
     *context = NULL;
-    ascc_context_options o = {0};
-    if ((options && !ascc_read_struct(&o, sizeof o, options, sizeof o)) || !options_valid(&o)) {
-        if (o.log)
-            o.log(o.user, "ascc_context_options: thread_count, cpu_disable or an incomplete set "
-                          "of callbacks is not accepted");
+    ascc_context_options read = {0};
+    if (options != NULL && !ascc_read_struct(&read, sizeof read, options, FIRST_OPTIONS_SIZE))
         return ASCC_ERROR_ARGUMENT;
-    }
-    ascc_allocator allocator = ascc_allocator_default();
-    if (o.allocate)
-        allocator = (ascc_allocator){o.allocate, o.reallocate, o.release, o.user};
-    ascc_context *c = ascc_allocate(&allocator, 1, sizeof *c);
-    struct ascc_context_shared *shared = ascc_allocate(&allocator, 1, sizeof *shared);
-    ascc_workers *workers = NULL;
-    if (!c || !shared ||
-        ascc_workers_create(&allocator, o.thread_count ? o.thread_count : 1, o.enqueue, o.finish,
-                            o.user, &workers) != ASCC_OK) {
-        ascc_release(&allocator, shared, 1, sizeof *shared);
-        ascc_release(&allocator, c, 1, sizeof *c);
-        if (o.log)
-            o.log(o.user, "no memory, or no threads, for a context");
-        return ASCC_ERROR_MEMORY;
-    }
-    memset(c, 0, sizeof *c);
-    memset(shared, 0, sizeof *shared);
-    atomic_init(&shared->references, 1);
-    pthread_mutex_init(&shared->lock, NULL);
-    c->magic = ASCC_CONTEXT_MAGIC;
-    c->allocator = allocator;
-    c->log = o.log;
-    c->user = o.user;
-    c->workers = workers;
-    c->cpu = ascc_kernels_available() & ~o.cpu_disable;
-    ascc_kernels_select(&c->kernels, c->cpu);
-    c->shared = shared;
-    *context = c;
-    return ASCC_OK;
+
+    ascc_message message;
+    ascc_status status = check_options(&read, &message);
+    if (status == ASCC_OK)
+        status = make(&read, context, &message);
+    if (status != ASCC_OK && read.log != NULL)
+        read.log(read.user, message.text);
+    return status;
+}
+
+void ascc_context_destroy(ascc_context **context)
+{
+    if (context == NULL || !is_context(*context))
+        return;
+    ascc_context_release(*context);
+    *context = NULL;
 }
 
 void ascc_context_retain(ascc_context *context)
@@ -76,33 +125,16 @@ void ascc_context_release(ascc_context *context)
 {
     if (atomic_fetch_sub_explicit(&context->shared->references, 1, memory_order_acq_rel) != 1)
         return;
-    const ascc_allocator allocator = context->allocator;
     ascc_workers_destroy(&context->workers);
     pthread_mutex_destroy(&context->shared->lock);
-    ascc_release(&allocator, context->shared, 1, sizeof *context->shared);
     context->magic = 0;
-    ascc_release(&allocator, context, 1, sizeof *context);
-}
-
-void ascc_context_destroy(ascc_context **context)
-{
-    if (!context || !*context)
-        return;
-    ascc_context *c = *context;
-    *context = NULL;
-    if (c->magic == ASCC_CONTEXT_MAGIC)
-        ascc_context_release(c);
+    const ascc_allocator allocator = context->allocator;
+    ascc_release(&allocator, context, 1, sizeof(context_block));
 }
 
 uint32_t ascc_context_cpu(const ascc_context *context)
 {
-    return context && context->magic == ASCC_CONTEXT_MAGIC ? context->cpu : 0;
-}
-
-void ascc_context_log(const ascc_context *context, const char *line)
-{
-    if (context->log)
-        context->log(context->user, line);
+    return is_context(context) ? context->cpu : 0;
 }
 
 ascc_status ascc_context_fail(ascc_context *context, ascc_status status,
@@ -115,17 +147,22 @@ ascc_status ascc_context_fail(ascc_context *context, ascc_status status,
     return status;
 }
 
+void ascc_context_log(const ascc_context *context, const char *line)
+{
+    if (context->log != NULL)
+        context->log(context->user, line);
+}
+
 size_t ascc_context_message(const ascc_context *context, char *text, size_t capacity)
 {
-    if (text && capacity)
-        text[0] = '\0';
-    if (!context || context->magic != ASCC_CONTEXT_MAGIC)
-        return 0;
-    pthread_mutex_lock(&context->shared->lock);
-    const ascc_message message = context->shared->message;
-    pthread_mutex_unlock(&context->shared->lock);
+    ascc_message message = {""};
+    if (is_context(context)) {
+        pthread_mutex_lock(&context->shared->lock);
+        message = context->shared->message;
+        pthread_mutex_unlock(&context->shared->lock);
+    }
     const size_t length = strlen(message.text);
-    if (text && capacity) {
+    if (text != NULL && capacity > 0) {
         const size_t copied = ascc_min_size(length, capacity - 1);
         memcpy(text, message.text, copied);
         text[copied] = '\0';

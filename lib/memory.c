@@ -1,47 +1,63 @@
-/* The only file that calls an allocator. SPDX-License-Identifier: MIT */
+/* The caller's allocator, and the arena that a step takes its scratch from.
+ * SPDX-License-Identifier: MIT */
 #include "memory.h"
 
 #include <stdlib.h>
 #include <string.h>
 
+#if defined(_WIN32)
+#include <malloc.h>
+#endif
+
+/* ---- The C library's allocator --------------------------------------------------------------- */
+
+/* posix_memalign takes any size, so that sanitizers see the very end of a block. */
 static void *default_allocate(void *user, size_t size, size_t alignment)
 {
     (void)user;
-    if (size > SIZE_MAX - alignment)
-        return NULL;
-    return aligned_alloc(alignment, (size + alignment - 1) / alignment * alignment);
-}
-
-static void *default_reallocate(void *user, void *memory, size_t old_size, size_t size,
-                                size_t alignment)
-{
-    void *to = default_allocate(user, size, alignment); /* realloc does not keep the alignment */
-    if (to) {
-        memcpy(to, memory, ascc_min_size(old_size, size));
-        free(memory);
-    }
-    return to;
+#if defined(_WIN32)
+    return _aligned_malloc(size, alignment);
+#else
+    void *memory = NULL;
+    return posix_memalign(&memory, alignment, size) == 0 ? memory : NULL;
+#endif
 }
 
 static void default_release(void *user, void *memory, size_t size)
 {
     (void)user;
     (void)size;
+#if defined(_WIN32)
+    _aligned_free(memory);
+#else
     free(memory);
+#endif
+}
+
+static void *default_reallocate(void *user, void *memory, size_t old_size, size_t size,
+                                size_t alignment)
+{
+    void *const moved = default_allocate(user, size, alignment);
+    if (moved != NULL) {
+        memcpy(moved, memory, ascc_min_size(old_size, size));
+        default_release(user, memory, old_size);
+    }
+    return moved;
 }
 
 ascc_allocator ascc_allocator_default(void)
 {
-    const ascc_allocator allocator = {default_allocate, default_reallocate, default_release, NULL};
-    return allocator;
+    return (ascc_allocator){default_allocate, default_reallocate, default_release, NULL};
 }
 
-/* Bytes of an array, at least one alignment's worth; false if that does not fit. */
+/* ---- Arrays ---------------------------------------------------------------------------------- */
+
+/* Bytes of an array; a byte for an empty one, so that it has an address. */
 static bool array_size(size_t count, size_t element, size_t *size)
 {
-    if (!ascc_multiply_size(count, element, size) || *size > SIZE_MAX / 2)
+    if (!ascc_multiply_size(count, element, size) || *size > PTRDIFF_MAX)
         return false;
-    *size = ascc_max_size(*size, ASCC_ALIGNMENT);
+    *size = ascc_max_size(*size, 1);
     return true;
 }
 
@@ -56,109 +72,123 @@ void *ascc_allocate(const ascc_allocator *allocator, size_t count, size_t elemen
 void ascc_release(const ascc_allocator *allocator, void *memory, size_t count, size_t element)
 {
     size_t size;
-    if (memory && array_size(count, element, &size))
+    if (memory != NULL && array_size(count, element, &size))
         allocator->release(allocator->user, memory, size);
 }
 
 bool ascc_grow(const ascc_allocator *allocator, void **memory, size_t *capacity, size_t count,
                size_t element)
 {
-    size_t old_size = 0, size;
-    if (*memory && count <= *capacity)
+    if (count <= *capacity)
         return true;
-    size_t wanted = ascc_max_size(count, *capacity + *capacity / 2);
-    if (!array_size(wanted, element, &size)) {
-        wanted = count;
-        if (!array_size(wanted, element, &size))
-            return false;
-    }
-    if (!*memory || !array_size(*capacity, element, &old_size)) {
-        *memory = ascc_allocate(allocator, wanted, element);
-        if (!*memory)
-            return false;
-        *capacity = wanted;
-        return true;
-    }
-    void *moved = allocator->reallocate(allocator->user, *memory, old_size, size, ASCC_ALIGNMENT);
-    if (!moved)
+    size_t size, old_size, grown = *capacity + *capacity / 2;
+    if (grown < count || !array_size(grown, element, &size))
+        grown = count;
+    if (!array_size(grown, element, &size))
+        return false;
+
+    void *moved;
+    if (*memory == NULL || !array_size(*capacity, element, &old_size))
+        moved = allocator->allocate(allocator->user, size, ASCC_ALIGNMENT);
+    else
+        moved = allocator->reallocate(allocator->user, *memory, old_size, size, ASCC_ALIGNMENT);
+    if (moved == NULL)
         return false;
     *memory = moved;
-    *capacity = wanted;
+    *capacity = grown;
     return true;
 }
 
-/* ---- Arena ---- */
+/* ---- Arena ----------------------------------------------------------------------------------- */
 
+/* One piece that did not fit into the block; the piece follows this header. */
 struct ascc_arena_overflow {
     ascc_arena_overflow *next;
     size_t size; /* header included */
 };
 
+#define OVERFLOW_HEADER ((size_t)ASCC_ALIGNMENT)
+_Static_assert(sizeof(ascc_arena_overflow) <= ASCC_ALIGNMENT, "the piece must stay aligned");
+
 void ascc_arena_open(ascc_arena *arena, const ascc_allocator *allocator)
 {
-    memset(arena, 0, sizeof *arena);
-    arena->allocator = allocator;
+    *arena = (ascc_arena){.allocator = allocator};
 }
 
-static void drop_overflow(ascc_arena *arena)
+static void *take_overflow(ascc_arena *arena, size_t size)
 {
-    while (arena->overflow) {
-        ascc_arena_overflow *next = arena->overflow->next;
-        ascc_release(arena->allocator, arena->overflow, arena->overflow->size, 1);
-        arena->overflow = next;
+    if (size > PTRDIFF_MAX - OVERFLOW_HEADER)
+        return NULL;
+    ascc_arena_overflow *const piece = ascc_allocate(arena->allocator, 1, OVERFLOW_HEADER + size);
+    if (piece == NULL)
+        return NULL;
+    piece->next = arena->overflow;
+    piece->size = OVERFLOW_HEADER + size;
+    arena->overflow = piece;
+    return (unsigned char *)piece + OVERFLOW_HEADER;
+}
+
+static void release_overflow(ascc_arena *arena)
+{
+    while (arena->overflow != NULL) {
+        ascc_arena_overflow *const piece = arena->overflow;
+        arena->overflow = piece->next;
+        ascc_release(arena->allocator, piece, 1, piece->size);
     }
+}
+
+static void release_block(ascc_arena *arena)
+{
+    ascc_release(arena->allocator, arena->block, 1, arena->block_size);
+    arena->block = NULL;
+    arena->block_size = 0;
 }
 
 void ascc_arena_close(ascc_arena *arena)
 {
-    if (!arena->allocator)
-        return;
-    drop_overflow(arena);
-    ascc_release(arena->allocator, arena->block, arena->block_size, 1);
-    memset(arena, 0, sizeof *arena);
+    release_overflow(arena);
+    release_block(arena);
+    arena->used = arena->needed = 0;
 }
 
 void *ascc_arena_take(ascc_arena *arena, size_t count, size_t element)
 {
     size_t size;
-    if (!array_size(count, element, &size) || size > SIZE_MAX / 4)
+    if (!array_size(count, element, &size))
         return NULL;
-    size = (size + ASCC_ALIGNMENT - 1) / ASCC_ALIGNMENT * ASCC_ALIGNMENT;
-    arena->needed += size;
-    if (arena->block && size <= arena->block_size - arena->used) {
-        void *piece = arena->block + arena->used;
+    size = (size + ASCC_ALIGNMENT - 1) & ~(size_t)(ASCC_ALIGNMENT - 1);
+
+    void *piece;
+    if (size <= arena->block_size - arena->used) {
+        piece = arena->block + arena->used;
         arena->used += size;
-        return piece;
+    } else {
+        piece = take_overflow(arena, size);
     }
-    ascc_arena_overflow *extra = ascc_allocate(arena->allocator, size + ASCC_ALIGNMENT, 1);
-    if (!extra)
-        return NULL;
-    extra->next = arena->overflow;
-    extra->size = size + ASCC_ALIGNMENT;
-    arena->overflow = extra;
-    return (unsigned char *)extra + ASCC_ALIGNMENT;
+    if (piece != NULL)
+        arena->needed += size;
+    return piece;
 }
 
 void ascc_arena_reset(ascc_arena *arena)
 {
-    arena->used = 0;
-    if (arena->overflow) {
-        drop_overflow(arena);
+    release_overflow(arena);
+    if (arena->needed > arena->block_size) {
         const size_t size = arena->needed + arena->needed / 4;
-        unsigned char *block = ascc_allocate(arena->allocator, size, 1);
-        if (block) {
-            ascc_release(arena->allocator, arena->block, arena->block_size, 1);
+        unsigned char *const block = ascc_allocate(arena->allocator, 1, size);
+        if (block != NULL) {
+            release_block(arena);
             arena->block = block;
             arena->block_size = size;
         }
     }
-    arena->needed = 0;
+    arena->used = arena->needed = 0;
 }
 
 size_t ascc_arena_size(const ascc_arena *arena)
 {
     size_t size = arena->block_size;
-    for (const ascc_arena_overflow *o = arena->overflow; o; o = o->next)
-        size += o->size;
+    for (const ascc_arena_overflow *piece = arena->overflow; piece != NULL; piece = piece->next)
+        size += piece->size;
     return size;
 }

@@ -121,8 +121,7 @@ static ascc_status measure_density(const ascc_particles *p, ascc_arena *arena, a
                       .source_grid = &grid,
                       .radius = radius * scale.inverse,
                       .same = true,
-                      .max_neighbors = 1 << 20,
-                      .mapping = -1};
+                      .max_neighbors = 1 << 20};
     status = ascc_grid_build(&grid, &tools, &points, &extent, rows.radius, false);
     if (status == ASCC_OK)
         status = ascc_rows_open(&rows, &tools, p->fluid_count * 36);

@@ -351,17 +351,8 @@ ascc_status ascc_rows_open(ascc_rows *rows, const ascc_search_tools *tools, size
     for (size_t i = 0; i < count; i++)
         rows->count[i] = ASCC_ROW_ABSENT;
     rows->neighbor = NULL;
-    memset(&rows->pairs, 0, sizeof rows->pairs);
     rows->capacity = expected;
     return ASCC_OK;
-}
-
-static float *grow_floats(ascc_arena *arena, const float *from, size_t used, size_t capacity)
-{
-    float *to = ascc_arena_take(arena, capacity, sizeof *to);
-    if (to && used)
-        memcpy(to, from, used * sizeof *to);
-    return to;
 }
 
 /* Room for `capacity` neighbours, the `used` ones kept. */
@@ -372,22 +363,7 @@ static bool rows_reserve(ascc_rows *rows, ascc_arena *arena, size_t capacity)
         return false;
     if (rows->used)
         memcpy(neighbor, rows->neighbor, rows->used * sizeof *neighbor);
-    ascc_pairs pairs = {0};
-    if (rows->mapping >= 0) {
-        pairs.x = grow_floats(arena, rows->pairs.x, rows->used, capacity);
-        pairs.y = grow_floats(arena, rows->pairs.y, rows->used, capacity);
-        pairs.z = grow_floats(arena, rows->pairs.z, rows->used, capacity);
-        if (!pairs.x || !pairs.y || !pairs.z)
-            return false;
-        for (int w = 0; w < 3; w++)
-            if (rows->wants_window[w]) {
-                pairs.window[w] = grow_floats(arena, rows->pairs.window[w], rows->used, capacity);
-                if (!pairs.window[w])
-                    return false;
-            }
-    }
     rows->neighbor = neighbor;
-    rows->pairs = pairs;
     rows->capacity = capacity;
     return true;
 }
@@ -492,7 +468,7 @@ static bool search_run(const rows_job *job, size_t begin, size_t end, const int3
     return true;
 }
 
-/* Puts a finished row at its place, geometry included. */
+/* Puts a finished row at its place. */
 static void store_row(rows_job *job, size_t query, const uint32_t *found, size_t count)
 {
     ascc_rows *rows = job->rows;
@@ -507,17 +483,6 @@ static void store_row(rows_job *job, size_t query, const uint32_t *found, size_t
            !atomic_compare_exchange_weak_explicit(&job->longest, &longest, (unsigned)count,
                                                   memory_order_relaxed, memory_order_relaxed))
         ;
-    if (rows->mapping < 0)
-        return;
-    ascc_pairs at = {rows->pairs.x + start, rows->pairs.y + start, rows->pairs.z + start, {0}};
-    for (int w = 0; w < 3; w++)
-        at.window[w] = rows->pairs.window[w] ? rows->pairs.window[w] + start : NULL;
-    const ascc_coordinates source = {rows->source->low[0], rows->source->low[1],
-                                     rows->source->low[2]};
-    int32_t here[3];
-    low_words(rows->query, query, here);
-    job->tools->kernels->geometry(&source, rows->neighbor + start, count, here[0], here[1], here[2],
-                                  (float)(1.0 / rows->radius), rows->mapping, &at);
 }
 
 typedef struct run {
@@ -614,15 +579,6 @@ static void drop_one_sided(void *data, size_t begin, size_t end, int32_t slot)
             const float d = squared_distance(at, rows->source, j);
             if (j != i && farther(d, (uint32_t)i, job->cut[j], job->cut_row[j]))
                 continue;
-            for (int w = 0; rows->mapping >= 0 && w < 3; w++)
-                if (rows->pairs.window[w])
-                    rows->pairs.window[w][rows->start[i] + kept] =
-                        rows->pairs.window[w][rows->start[i] + k];
-            if (rows->mapping >= 0) {
-                rows->pairs.x[rows->start[i] + kept] = rows->pairs.x[rows->start[i] + k];
-                rows->pairs.y[rows->start[i] + kept] = rows->pairs.y[rows->start[i] + k];
-                rows->pairs.z[rows->start[i] + kept] = rows->pairs.z[rows->start[i] + k];
-            }
             neighbor[kept++] = j;
         }
         rows->count[i] = (uint32_t)kept;

@@ -99,11 +99,8 @@ typedef struct ascc_rows {
     int32_t limit;         /* nearest neighbours kept, mutual if `same`; 0 = all */
     int32_t max_neighbors; /* before LIMIT */
     uint32_t *count;       /* [query count]; ASCC_ROW_ABSENT = not made */
-    size_t *start;         /* [query count] into neighbor and pairs */
+    size_t *start;         /* [query count] into neighbor */
     uint32_t *neighbor;    /* rows of the source set */
-    ascc_pairs pairs;      /* geometry; windows only those wanted */
-    int mapping;           /* ascc_mapping; < 0 = no geometry wanted */
-    bool wants_window[3];  /* by ascc_window */
     size_t capacity, used;
     uint32_t longest;
 } ascc_rows;

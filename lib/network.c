@@ -8,15 +8,9 @@
 #define WANTS_RECTIFIED 2
 
 /* Rows that are computed together: their columns share one pass over the weights. */
-#define TILE_ROWS 16
+#define TILE_ROWS 24
 /* Floats between the columns of a tile beyond their length, so that they do not collide in the cache. */
 #define COLUMN_PADDING 16
-
-#if defined(__GNUC__)
-#define MARK(flag) __atomic_store_n(&(flag), (uint8_t)1, __ATOMIC_RELAXED)
-#else
-#define MARK(flag) ((flag) = 1)
-#endif
 
 int32_t ascc_network_set(const ascc_network *network, int32_t value)
 {
@@ -45,19 +39,16 @@ static int32_t find_key(ascc_network *network, int32_t query, int32_t source,
                             .source = source,
                             .skip_self = skip_self,
                             .limit = filter->neighbor_limit,
-                            .mapping = (int32_t)filter->mapping,
                             .radius = filter->radius};
     int32_t k = 0;
     for (; k < network->key_count; k++) {
         const ascc_rows_key *key = &network->key[k];
         if (key->query == query && key->source == source && key->skip_self == wanted.skip_self &&
-            key->limit == wanted.limit && key->mapping == wanted.mapping &&
-            key->radius == wanted.radius)
+            key->limit == wanted.limit && key->radius == wanted.radius)
             break;
     }
     if (k == network->key_count)
         network->key[network->key_count++] = wanted;
-    network->key[k].window[filter->window] = 1;
     return k;
 }
 
@@ -183,9 +174,6 @@ static ascc_status open_rows(ascc_network_run *run)
         rows->skip_self = key->skip_self;
         rows->limit = key->limit;
         rows->max_neighbors = network->max_neighbors;
-        rows->mapping = key->mapping;
-        for (int w = 0; w < 3; w++)
-            rows->wants_window[w] = w > 0 && key->window[w];
         ascc_status status =
             ascc_hierarchy_grid(h, run->tools, key->query, rows->radius, &rows->query_grid);
         if (status == ASCC_OK)
@@ -236,17 +224,27 @@ typedef struct mark_job {
     const ascc_rows *rows;
     const uint8_t *active;
     uint8_t *source;
+    atomic_size_t left; /* rows of the source not marked yet */
 } mark_job;
 
 static void mark_neighbors(void *data, size_t begin, size_t end, int32_t slot)
 {
     (void)slot;
-    const mark_job *job = data;
+    mark_job *job = data;
     const ascc_rows *rows = job->rows;
-    for (size_t i = begin; i < end; i++)
-        if (job->active[i])
-            for (uint32_t k = 0; k < rows->count[i]; k++)
-                MARK(job->source[rows->neighbor[rows->start[i] + k]]);
+    for (size_t i = begin; i < end; i++) {
+        if (!job->active[i])
+            continue;
+        if (!atomic_load_explicit(&job->left, memory_order_relaxed))
+            return;
+        const uint32_t *neighbor = rows->neighbor + rows->start[i];
+        for (uint32_t k = 0; k < rows->count[i]; k++) {
+            uint8_t *flag = &job->source[neighbor[k]];
+            if (!__atomic_load_n(flag, __ATOMIC_RELAXED) &&
+                !__atomic_exchange_n(flag, (uint8_t)1, __ATOMIC_RELAXED))
+                atomic_fetch_sub_explicit(&job->left, 1, memory_order_relaxed);
+        }
+    }
 }
 
 /* Makes the rows of the active queries and marks what they read. */
@@ -257,7 +255,10 @@ static ascc_status demand_rows(ascc_network_run *run, int32_t key, const uint8_t
     const ascc_status status = ascc_rows_make(rows, run->tools, active);
     if (status != ASCC_OK)
         return status;
-    mark_job job = {rows, active, source};
+    size_t left = 0;
+    for (size_t i = 0; i < rows->source->count; i++)
+        left += !source[i];
+    mark_job job = {rows, active, source, left};
     ascc_workers_run(run->tools->workers, rows->query->count, 1024, mark_neighbors, &job);
     return ASCC_OK;
 }
@@ -340,14 +341,31 @@ typedef struct layer_job {
     ascc_value *value;
     size_t width;         /* of a tile's row: what any term may write */
     const uint32_t *list; /* active rows */
-    float *scratch;       /* [slots][scratch_size]: columns, then a tile of the layer */
-    size_t scratch_size, tile_offset;
+    float *scratch;       /* [slots][scratch_size]: columns, a tile of the layer, geometry */
+    size_t scratch_size, tile_offset, geometry_offset;
+    size_t room; /* pairs of the longest row */
 } layer_job;
 
 static const float *source_values(const ascc_network_run *run, const ascc_term *term)
 {
     const ascc_value *value = &run->value[term->source];
     return term->rectify ? value->rectified : value->raw;
+}
+
+ascc_geometry ascc_network_geometry(const ascc_network_run *run, const ascc_rows *rows,
+                                    const ascc_filter *filter, size_t query,
+                                    const uint32_t *neighbor, size_t count, float *scratch,
+                                    size_t room)
+{
+    ascc_geometry g = {{scratch, scratch + room, scratch + 2 * room, {NULL}}, NULL};
+    if (filter->window != ASCC_WINDOW_NONE)
+        g.window = g.pairs.window[filter->window] = scratch + 3 * room;
+    const ascc_points *s = rows->source, *q = rows->query;
+    const ascc_coordinates source = {s->low[0], s->low[1], s->low[2]};
+    run->tools->kernels->geometry(&source, neighbor, count, q->low[0][query], q->low[1][query],
+                                  q->low[2][query], (float)(1.0 / rows->radius),
+                                  (int)filter->mapping, &g.pairs);
+    return g;
 }
 
 static void add_bias(const ascc_term *term, float *row)
@@ -357,19 +375,20 @@ static void add_bias(const ascc_term *term, float *row)
 }
 
 static void convolve_tile(const layer_job *job, const ascc_term *term, const ascc_rows *rows,
-                          const uint32_t *list, size_t n, float *column, float *tile)
+                          const uint32_t *list, size_t n, float *column, float *tile,
+                          float *geometry)
 {
     const ascc_kernels *kernels = job->run->tools->kernels;
     const size_t a = ascc_padded(term->inputs), width = job->width;
     const size_t length = cell_count(&term->filter) * a, stride = length + COLUMN_PADDING;
     const float *feature = source_values(job->run, term);
     for (size_t r = 0; r < n; r++) {
-        const size_t start = rows->start[list[r]];
-        const ascc_pairs pairs = {
-            rows->pairs.x + start, rows->pairs.y + start, rows->pairs.z + start, {0}};
-        const float *window = rows->pairs.window[term->filter.window];
-        kernels->gather(&pairs, window ? window + start : NULL, rows->neighbor + start,
-                        rows->count[list[r]], feature, a, term->filter.cells, column + r * stride);
+        const uint32_t *neighbor = rows->neighbor + rows->start[list[r]];
+        const size_t count = rows->count[list[r]];
+        const ascc_geometry g = ascc_network_geometry(job->run, rows, &term->filter, list[r],
+                                                      neighbor, count, geometry, job->room);
+        kernels->gather(&g.pairs, g.window, neighbor, count, feature, a, term->filter.cells,
+                        column + r * stride);
         add_bias(term, tile + r * width + term->column);
     }
     kernels->multiply(column, stride, n, length,
@@ -432,7 +451,8 @@ static void compute_tiles(void *data, size_t begin, size_t end, int32_t slot)
             const ascc_term *term = &plan->term[t];
             const int32_t key = job->run->network->term_key[t];
             if (key >= 0)
-                convolve_tile(job, term, &job->run->rows[key], list, n, column, tile);
+                convolve_tile(job, term, &job->run->rows[key], list, n, column, tile,
+                              column + job->geometry_offset);
             else
                 pointwise_tile(job, term, list, n, tile);
         }
@@ -486,7 +506,9 @@ static ascc_status compute_layer(ascc_network_run *run, int32_t l, uint32_t *lis
     const size_t slots = (size_t)ascc_workers_count(tools->workers);
     job.width = ascc_padded(layer->channels) + 8;
     job.tile_offset = TILE_ROWS * longest;
-    job.scratch_size = job.tile_offset + TILE_ROWS * job.width;
+    job.room = ((size_t)run->longest + 15) / 8 * 8;
+    job.geometry_offset = job.tile_offset + TILE_ROWS * job.width;
+    job.scratch_size = job.geometry_offset + ASCC_GEOMETRY_ARRAYS * job.room;
     job.scratch = ascc_arena_take(tools->arena, slots * job.scratch_size, sizeof(float));
     if (!job.scratch || !take_value(run, l + 2))
         return ascc_fail(tools->message, ASCC_ERROR_MEMORY, "no memory for layer %s", layer->name);

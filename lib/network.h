@@ -9,11 +9,11 @@
 
 #include "hierarchy.h"
 
-/* Which rows a term reads; terms that look alike share them. */
+/* Which rows a term reads; terms that look alike share them. Their geometry is not kept: computing it
+ * where it is used costs less than its memory. */
 typedef struct ascc_rows_key {
     int32_t query, source; /* sets */
-    int32_t skip_self, limit, mapping;
-    int32_t window[3];
+    int32_t skip_self, limit;
     double radius;   /* m */
     size_t expected; /* neighbours, from the last step */
 } ascc_rows_key;
@@ -65,6 +65,18 @@ typedef struct ascc_network_run {
     size_t neighbor_count;
     uint32_t longest;
 } ascc_network_run;
+
+/* Geometry of up to `room` pairs in scratch, for one filter. */
+typedef struct ascc_geometry {
+    ascc_pairs pairs;
+    const float *window; /* NULL = 1 */
+} ascc_geometry;
+
+#define ASCC_GEOMETRY_ARRAYS 4 /* floats of scratch for each pair */
+ascc_geometry ascc_network_geometry(const ascc_network_run *run, const ascc_rows *rows,
+                                    const ascc_filter *filter, size_t query,
+                                    const uint32_t *neighbor, size_t count, float *scratch,
+                                    size_t room);
 
 /* Finds the rows every value needs and searches them. errors: MEMORY, RANGE, LIMIT. */
 ascc_status ascc_network_demand(ascc_network_run *run, ascc_network *network,

@@ -1,314 +1,403 @@
-/* Snapshot, restore and hash of a particle set. SPDX-License-Identifier: MIT
- *
- * A snapshot is little-endian words of 8 bytes: header, fluid columns, boundary columns, checksum.
- */
+/* Snapshot, restore and hash of a particle set. SPDX-License-Identifier: MIT */
+#include "particles.h"
+
 #include <inttypes.h>
 #include <math.h>
 #include <string.h>
 
-#include "particles.h"
+/* ---- Snapshot -------------------------------------------------------------------------------- */
 
-#define SNAPSHOT_MAGIC 0x31706e7363736173u /* "sascsnp1" */
-#define HEADER_WORDS 9
+/*
+ * A row of 64-bit words, little-endian on every machine; floats are their IEEE bits:
+ *
+ *   magic, version, dimension, fluid count, boundary count, next id, spacing, mass, quantum,
+ *   positions, momenta, masses, ids,
+ *   wall positions, normals, impulses, ids, bodies,
+ *   checksum of all before
+ */
+#define SNAPSHOT_MAGIC UINT64_C(0x50414e5343435341) /* the bytes "ASCCSNAP" */
+#define SNAPSHOT_VERSION 1
+#define SNAPSHOT_HEADER 9
+#define SNAPSHOT_FRAME (SNAPSHOT_HEADER + 1) /* and the checksum */
 
-static bool valid(const ascc_particles *p)
+static size_t fluid_words(size_t dimension)
 {
-    return p && p->magic == ASCC_PARTICLES_MAGIC;
+    return 2 * dimension + 2;
 }
 
-static uint64_t mix(uint64_t h)
+static size_t boundary_words(size_t dimension)
 {
-    h ^= h >> 30;
-    h *= 0xbf58476d1ce4e5b9u;
-    h ^= h >> 27;
-    h *= 0x94d049bb133111ebu;
-    return h ^ h >> 31;
+    return 3 * dimension + 2;
 }
 
-static uint64_t chain(uint64_t h, uint64_t word)
-{
-    return mix(h + 0x9e3779b97f4a7c15u + word) + word * 0xd6e8feb86659fd93u;
-}
-
-static uint64_t bits_of(double x)
+static uint64_t bits_of(double value)
 {
     uint64_t bits;
-    memcpy(&bits, &x, sizeof bits);
+    memcpy(&bits, &value, sizeof bits);
     return bits;
 }
 
 static double double_of(uint64_t bits)
 {
-    double x;
-    memcpy(&x, &bits, sizeof x);
-    return x;
+    double value;
+    memcpy(&value, &bits, sizeof value);
+    return value;
 }
 
-/* ---- Hash ---- */
-
-uint64_t ascc_particles_hash(const ascc_particles *p)
-{
-    if (!valid(p))
-        return 0;
-    const size_t d = (size_t)p->dimension;
-    uint64_t sum = 0; /* of the particles' own hashes: order does not matter */
-    for (size_t i = 0; i < p->fluid_count; i++) {
-        uint64_t h = chain(1, bits_of(p->mass[i]));
-        for (size_t c = 0; c < d; c++) {
-            h = chain(h, bits_of(p->position[i * d + c] + 0.0)); /* -0 is 0 */
-            h = chain(h, (uint64_t)p->momentum[i * d + c]);
-        }
-        sum += mix(h);
-    }
-    for (size_t i = 0; i < p->boundary_count; i++) {
-        uint64_t h = chain(2, (uint64_t)p->wall_body[i]);
-        for (size_t c = 0; c < d; c++) {
-            h = chain(h, bits_of(p->wall_position[i * d + c] + 0.0));
-            h = chain(h, bits_of(p->wall_normal[i * d + c] + 0.0));
-        }
-        sum += mix(h);
-    }
-    uint64_t h = chain(3, (uint64_t)p->dimension);
-    h = chain(h, p->fluid_count);
-    h = chain(h, p->boundary_count);
-    return chain(h, sum);
-}
-
-/* ---- Words ---- */
-
-static void put(unsigned char **at, uint64_t word)
+static void put_word(unsigned char *into, uint64_t word)
 {
     for (int i = 0; i < 8; i++)
-        (*at)[i] = (unsigned char)(word >> 8 * i);
-    *at += 8;
+        into[i] = (unsigned char)(word >> 8 * i);
 }
 
-static uint64_t take(const unsigned char **at)
+static uint64_t get_word(const unsigned char *from)
 {
     uint64_t word = 0;
     for (int i = 0; i < 8; i++)
-        word |= (uint64_t)(*at)[i] << 8 * i;
-    *at += 8;
+        word |= (uint64_t)from[i] << 8 * i;
     return word;
 }
 
+/* Each step is a bijection of both the sum and the word, so no change of one word goes unseen. */
 static uint64_t checksum(const unsigned char *bytes, size_t words)
 {
-    uint64_t h = 4;
-    for (size_t i = 0; i < words; i++)
-        h = chain(h, take(&bytes));
-    return h;
+    uint64_t sum = SNAPSHOT_MAGIC;
+    for (size_t i = 0; i < words; i++) {
+        sum = (sum ^ get_word(bytes + 8 * i)) * UINT64_C(0x9e3779b97f4a7c15);
+        sum ^= sum >> 32;
+    }
+    return sum;
 }
 
-/* Words of all columns: fluid x p m id, boundary x n body id impulse. False if that does not fit. */
-static bool body_words(size_t d, size_t fluid, size_t boundary, size_t *words)
+static size_t snapshot_words(const ascc_particles *particles)
 {
-    size_t a, b;
-    if (!ascc_multiply_size(fluid, 2 * d + 2, &a) || !ascc_multiply_size(boundary, 3 * d + 2, &b) ||
-        a > SIZE_MAX / 16 || b > SIZE_MAX / 16)
-        return false;
-    *words = a + b;
-    return true;
+    const size_t d = ascc_particles_width(particles);
+    return SNAPSHOT_FRAME + particles->fluid_count * fluid_words(d) +
+           particles->boundary_count * boundary_words(d);
 }
 
-size_t ascc_particles_snapshot_size(const ascc_particles *p)
+size_t ascc_particles_snapshot_size(const ascc_particles *particles)
 {
-    size_t words;
-    if (!valid(p) || !body_words((size_t)p->dimension, p->fluid_count, p->boundary_count, &words))
-        return 0;
-    return (HEADER_WORDS + words + 1) * 8;
+    return ascc_particles_is_set(particles) ? 8 * snapshot_words(particles) : 0;
 }
 
-/* ---- Snapshot ---- */
-
-static void put_doubles(unsigned char **at, const double *x, size_t count)
+static unsigned char *put(unsigned char *into, uint64_t word)
 {
-    for (size_t i = 0; i < count; i++)
-        put(at, bits_of(x[i]));
+    put_word(into, word);
+    return into + 8;
 }
 
-static void put_integers(unsigned char **at, const int64_t *x, size_t count)
+static unsigned char *put_doubles(unsigned char *into, const double *values, size_t count)
 {
     for (size_t i = 0; i < count; i++)
-        put(at, (uint64_t)x[i]);
+        into = put(into, bits_of(values[i]));
+    return into;
 }
 
-ascc_status ascc_particles_snapshot(const ascc_particles *p, void *memory, size_t capacity)
+static unsigned char *put_integers(unsigned char *into, const int64_t *values, size_t count)
 {
-    if (!valid(p) || !memory || capacity < ascc_particles_snapshot_size(p))
+    for (size_t i = 0; i < count; i++)
+        into = put(into, (uint64_t)values[i]);
+    return into;
+}
+
+static unsigned char *put_ids(unsigned char *into, const uint64_t *values, size_t count)
+{
+    for (size_t i = 0; i < count; i++)
+        into = put(into, values[i]);
+    return into;
+}
+
+ascc_status ascc_particles_snapshot(const ascc_particles *particles, void *memory, size_t capacity)
+{
+    if (!ascc_particles_is_set(particles))
         return ASCC_ERROR_ARGUMENT;
-    const size_t d = (size_t)p->dimension, n = p->fluid_count, w = p->boundary_count;
+    const size_t size = ascc_particles_snapshot_size(particles);
+    if (memory == NULL || capacity < size)
+        return ascc_particles_fail(ascc_particles_writable(particles), ASCC_ERROR_ARGUMENT,
+                                   "memory: NULL, or its %zu bytes are fewer than %zu", capacity,
+                                   size);
+    const size_t fluid = particles->fluid_count, boundary = particles->boundary_count;
+    const size_t d = ascc_particles_width(particles);
     unsigned char *at = memory;
-    put(&at, SNAPSHOT_MAGIC);
-    put(&at, 1); /* version */
-    put(&at, (uint64_t)p->dimension);
-    put(&at, n);
-    put(&at, w);
-    put(&at, bits_of(p->spacing));
-    put(&at, bits_of(p->default_mass));
-    put(&at, bits_of(p->quantum));
-    put(&at, p->next_id);
-    put_doubles(&at, p->position, n * d);
-    put_integers(&at, p->momentum, n * d);
-    put_doubles(&at, p->mass, n);
-    for (size_t i = 0; i < n; i++)
-        put(&at, p->id[i]);
-    put_doubles(&at, p->wall_position, w * d);
-    put_doubles(&at, p->wall_normal, w * d);
-    for (size_t i = 0; i < w; i++)
-        put(&at, (uint64_t)p->wall_body[i]);
-    for (size_t i = 0; i < w; i++)
-        put(&at, p->wall_id[i]);
-    put_integers(&at, p->wall_impulse, w * d);
-    const size_t words = (size_t)(at - (unsigned char *)memory) / 8;
-    put(&at, checksum(memory, words));
+    at = put(at, SNAPSHOT_MAGIC);
+    at = put(at, SNAPSHOT_VERSION);
+    at = put(at, d);
+    at = put(at, fluid);
+    at = put(at, boundary);
+    at = put(at, particles->next_id);
+    at = put(at, bits_of(particles->spacing));
+    at = put(at, bits_of(particles->default_mass));
+    at = put(at, bits_of(particles->quantum));
+    at = put_doubles(at, particles->position, fluid * d);
+    at = put_integers(at, particles->momentum, fluid * d);
+    at = put_doubles(at, particles->mass, fluid);
+    at = put_ids(at, particles->id, fluid);
+    at = put_doubles(at, particles->wall_position, boundary * d);
+    at = put_doubles(at, particles->wall_normal, boundary * d);
+    at = put_integers(at, particles->wall_impulse, boundary * d);
+    at = put_ids(at, particles->wall_id, boundary);
+    for (size_t i = 0; i < boundary; i++)
+        at = put(at, (uint64_t)particles->wall_body[i]);
+    put(at, checksum(memory, (size_t)(at - (unsigned char *)memory) / 8));
     return ASCC_OK;
 }
 
-/* ---- Restore ---- */
-
-/* A snapshot's header, and its columns as words. */
+/* A snapshot taken apart: where its arrays begin. */
 typedef struct snapshot {
-    uint64_t dimension, fluid, boundary, next_id;
+    size_t dimension, fluid, boundary;
+    uint64_t next_id;
     double spacing, mass, quantum;
-    const unsigned char *position, *momentum, *masses, *id;
-    const unsigned char *wall_position, *wall_normal, *body, *wall_id, *impulse;
+    const unsigned char *position, *momentum, *masses, *ids;
+    const unsigned char *wall_position, *wall_normal, *wall_impulse, *wall_ids, *wall_bodies;
 } snapshot;
 
-static double double_at(const unsigned char *column, size_t i)
+/* Steps over an array of words. */
+static const unsigned char *skip(const unsigned char **at, size_t words)
 {
-    const unsigned char *at = column + i * 8;
-    return double_of(take(&at));
+    const unsigned char *const begin = *at;
+    *at += 8 * words;
+    return begin;
 }
 
-static uint64_t word_at(const unsigned char *column, size_t i)
+/* Reads header and sizes of untrusted bytes. On failure *why says what is wrong. */
+static bool open_snapshot(const unsigned char *bytes, size_t size, snapshot *from, const char **why)
 {
-    const unsigned char *at = column + i * 8;
-    return take(&at);
+    *why = "not a snapshot";
+    if (size < 8 * SNAPSHOT_FRAME || size % 8 != 0 || get_word(bytes) != SNAPSHOT_MAGIC)
+        return false;
+    *why = "of a version not known here";
+    if (get_word(bytes + 8) != SNAPSHOT_VERSION)
+        return false;
+    *why = "damaged: its checksum is wrong";
+    if (get_word(bytes + size - 8) != checksum(bytes, size / 8 - 1))
+        return false;
+
+    *why = "of no possible dimension or size";
+    const uint64_t dimension = get_word(bytes + 16);
+    const uint64_t fluid = get_word(bytes + 24), boundary = get_word(bytes + 32);
+    if (dimension != 2 && dimension != 3)
+        return false;
+    const size_t d = (size_t)dimension, words = size / 8 - SNAPSHOT_FRAME;
+    if (fluid > words / fluid_words(d) || boundary > words / boundary_words(d) ||
+        (size_t)fluid * fluid_words(d) + (size_t)boundary * boundary_words(d) != words)
+        return false;
+
+    const size_t n = (size_t)fluid, m = (size_t)boundary;
+    *from = (snapshot){.dimension = d,
+                       .fluid = n,
+                       .boundary = m,
+                       .next_id = get_word(bytes + 40),
+                       .spacing = double_of(get_word(bytes + 48)),
+                       .mass = double_of(get_word(bytes + 56)),
+                       .quantum = double_of(get_word(bytes + 64))};
+    const unsigned char *at = bytes + 8 * SNAPSHOT_HEADER;
+    from->position = skip(&at, n * d);
+    from->momentum = skip(&at, n * d);
+    from->masses = skip(&at, n);
+    from->ids = skip(&at, n);
+    from->wall_position = skip(&at, m * d);
+    from->wall_normal = skip(&at, m * d);
+    from->wall_impulse = skip(&at, m * d);
+    from->wall_ids = skip(&at, m);
+    from->wall_bodies = skip(&at, m);
+    return true;
 }
 
-static ascc_status read_header(ascc_particles *p, const unsigned char *memory, size_t size,
-                               snapshot *s)
+static bool are_coordinates(const unsigned char *from, size_t count, double spacing)
 {
-    const unsigned char *at = memory;
-    size_t words;
-    if (size < (HEADER_WORDS + 1) * 8 || take(&at) != SNAPSHOT_MAGIC)
-        return ascc_particles_fail(p, ASCC_ERROR_FORMAT, "snapshot: not one of these");
-    const uint64_t version = take(&at);
-    if (version != 1)
-        return ascc_particles_fail(p, ASCC_ERROR_FORMAT,
-                                   "snapshot: version %" PRIu64 " is not known", version);
-    s->dimension = take(&at);
-    s->fluid = take(&at);
-    s->boundary = take(&at);
-    s->spacing = double_of(take(&at));
-    s->mass = double_of(take(&at));
-    s->quantum = double_of(take(&at));
-    s->next_id = take(&at);
-    if (s->dimension != (uint64_t)p->dimension)
-        return ascc_particles_fail(p, ASCC_ERROR_MISMATCH,
-                                   "snapshot: of dimension %" PRIu64 ", the set has %d",
-                                   s->dimension, p->dimension);
-    const size_t d = (size_t)p->dimension;
-    if (s->fluid >= UINT32_MAX || s->boundary >= UINT32_MAX ||
-        !body_words(d, (size_t)s->fluid, (size_t)s->boundary, &words) ||
-        size != (HEADER_WORDS + words + 1) * 8)
-        return ascc_particles_fail(p, ASCC_ERROR_FORMAT,
-                                   "snapshot: %zu bytes do not hold %" PRIu64 " fluid and %" PRIu64
-                                   " boundary particles",
-                                   size, s->fluid, s->boundary);
-    if (word_at(memory, HEADER_WORDS + words) != checksum(memory, HEADER_WORDS + words))
-        return ascc_particles_fail(p, ASCC_ERROR_FORMAT, "snapshot: the checksum does not match");
-    const size_t n = (size_t)s->fluid, w = (size_t)s->boundary;
-    s->position = at;
-    s->momentum = s->position + n * d * 8;
-    s->masses = s->momentum + n * d * 8;
-    s->id = s->masses + n * 8;
-    s->wall_position = s->id + n * 8;
-    s->wall_normal = s->wall_position + w * d * 8;
-    s->body = s->wall_normal + w * d * 8;
-    s->wall_id = s->body + w * 8;
-    s->impulse = s->wall_id + w * 8;
-    return ASCC_OK;
-}
-
-static bool ids_ascend(const unsigned char *column, size_t count, uint64_t next_id)
-{
-    uint64_t last = 0;
-    for (size_t i = 0; i < count; i++) {
-        const uint64_t id = word_at(column, i);
-        if (id <= last || id >= next_id)
+    for (size_t i = 0; i < count; i++)
+        if (!(fabs(double_of(get_word(from + 8 * i))) <= ASCC_POSITION_LIMIT * spacing))
             return false;
-        last = id;
+    return true;
+}
+
+static bool are_momenta(const unsigned char *from, size_t count)
+{
+    for (size_t i = 0; i < count; i++) { /* -limit <= momentum <= limit, without sign changes */
+        const uint64_t shifted = get_word(from + 8 * i) + (uint64_t)ASCC_MOMENTUM_LIMIT;
+        if (shifted > 2 * (uint64_t)ASCC_MOMENTUM_LIMIT)
+            return false;
     }
     return true;
 }
 
-/* Whether every number is one that the set could hold. */
-static bool content_valid(const snapshot *s, size_t d)
+static bool are_masses(const unsigned char *from, size_t count)
 {
-    const size_t n = (size_t)s->fluid, w = (size_t)s->boundary;
-    bool good = s->spacing > 0.0 && isfinite(s->spacing) && s->mass > 0.0 && isfinite(s->mass) &&
-                s->quantum > 0.0 && isfinite(s->quantum);
-    const double far = ASCC_POSITION_LIMIT * s->spacing;
-    for (size_t k = 0; good && k < n * d; k++) {
-        const int64_t p = (int64_t)word_at(s->momentum, k);
-        good = fabs(double_at(s->position, k)) <= far && p <= ASCC_MOMENTUM_LIMIT &&
-               p >= -ASCC_MOMENTUM_LIMIT;
-    }
-    for (size_t i = 0; good && i < n; i++)
-        good = double_at(s->masses, i) > 0.0 && isfinite(double_at(s->masses, i));
-    for (size_t k = 0; good && k < w * d; k++)
-        good = fabs(double_at(s->wall_position, k)) <= far &&
-               fabs(double_at(s->wall_normal, k)) <= 1.01;
-    for (size_t i = 0; good && i < w; i++)
-        good = word_at(s->body, i) <= INT32_MAX;
-    return good && ids_ascend(s->id, n, s->next_id) && ids_ascend(s->wall_id, w, s->next_id);
+    for (size_t i = 0; i < count; i++)
+        if (!ascc_is_mass(double_of(get_word(from + 8 * i))))
+            return false;
+    return true;
 }
 
-static void copy_content(ascc_particles *p, const snapshot *s)
+static bool are_normals(const unsigned char *from, size_t count, size_t dimension)
 {
-    const size_t d = (size_t)p->dimension, n = (size_t)s->fluid, w = (size_t)s->boundary;
-    p->fluid_count = n;
-    p->boundary_count = w;
-    p->spacing = s->spacing;
-    p->default_mass = s->mass;
-    p->quantum = s->quantum;
-    p->next_id = s->next_id;
-    for (size_t k = 0; k < n * d; k++) {
-        p->position[k] = double_at(s->position, k);
-        p->momentum[k] = (int64_t)word_at(s->momentum, k);
+    for (size_t i = 0; i < count; i++) {
+        double square = 0;
+        for (size_t c = 0; c < dimension; c++) {
+            const double value = double_of(get_word(from + 8 * (i * dimension + c)));
+            square += value * value;
+        }
+        if (!ascc_is_normal_length(sqrt(square)))
+            return false;
     }
-    for (size_t i = 0; i < n; i++) {
-        p->mass[i] = double_at(s->masses, i);
-        p->id[i] = word_at(s->id, i);
-    }
-    for (size_t k = 0; k < w * d; k++) {
-        p->wall_position[k] = double_at(s->wall_position, k);
-        p->wall_normal[k] = double_at(s->wall_normal, k);
-        p->wall_impulse[k] = (int64_t)word_at(s->impulse, k);
-    }
-    for (size_t i = 0; i < w; i++) {
-        p->wall_body[i] = (int32_t)word_at(s->body, i);
-        p->wall_id[i] = word_at(s->wall_id, i);
-    }
+    return true;
 }
 
-ascc_status ascc_particles_restore(ascc_particles *p, const void *memory, size_t size)
+static bool are_bodies(const unsigned char *from, size_t count)
 {
-    if (!valid(p))
+    for (size_t i = 0; i < count; i++)
+        if (get_word(from + 8 * i) > INT32_MAX)
+            return false;
+    return true;
+}
+
+/* Ids ascend in each kind, are in none twice, and were given out. */
+static bool are_ids(const snapshot *from)
+{
+    size_t i = 0, k = 0;
+    uint64_t last = 0;
+    while (i < from->fluid || k < from->boundary) {
+        const uint64_t fluid = i < from->fluid ? get_word(from->ids + 8 * i) : UINT64_MAX;
+        const uint64_t wall = k < from->boundary ? get_word(from->wall_ids + 8 * k) : UINT64_MAX;
+        const bool is_fluid = k == from->boundary || (i < from->fluid && fluid < wall);
+        const uint64_t id = is_fluid ? fluid : wall;
+        if (id <= last || id >= from->next_id)
+            return false;
+        last = id;
+        if (is_fluid)
+            i++;
+        else
+            k++;
+    }
+    return from->next_id > 0;
+}
+
+/* NULL, or what cannot be. */
+static const char *check_snapshot(const snapshot *from)
+{
+    const size_t d = from->dimension;
+    if (!ascc_is_spacing(from->spacing) || !ascc_is_mass(from->mass) ||
+        !ascc_is_quantum(from->quantum))
+        return "has an impossible spacing, mass or quantum";
+    if (!are_coordinates(from->position, from->fluid * d, from->spacing) ||
+        !are_coordinates(from->wall_position, from->boundary * d, from->spacing))
+        return "has an impossible position";
+    if (!are_momenta(from->momentum, from->fluid * d))
+        return "has an impossible momentum";
+    if (!are_masses(from->masses, from->fluid))
+        return "has an impossible mass";
+    if (!are_normals(from->wall_normal, from->boundary, d))
+        return "has an impossible normal";
+    if (!are_bodies(from->wall_bodies, from->boundary))
+        return "has an impossible body";
+    if (!are_ids(from))
+        return "has impossible ids";
+    return NULL;
+}
+
+static void get_doubles(double *into, const unsigned char *from, size_t count)
+{
+    for (size_t i = 0; i < count; i++)
+        into[i] = double_of(get_word(from + 8 * i));
+}
+
+static void get_integers(int64_t *into, const unsigned char *from, size_t count)
+{
+    for (size_t i = 0; i < count; i++)
+        into[i] = (int64_t)get_word(from + 8 * i);
+}
+
+static void get_words(uint64_t *into, const unsigned char *from, size_t count)
+{
+    for (size_t i = 0; i < count; i++)
+        into[i] = get_word(from + 8 * i);
+}
+
+static void become(ascc_particles *particles, const snapshot *from)
+{
+    const size_t n = from->fluid, m = from->boundary, d = from->dimension;
+    particles->spacing = from->spacing;
+    particles->default_mass = from->mass;
+    particles->quantum = from->quantum;
+    particles->next_id = from->next_id;
+    particles->fluid_count = n;
+    particles->boundary_count = m;
+    get_doubles(particles->position, from->position, n * d);
+    get_integers(particles->momentum, from->momentum, n * d);
+    get_doubles(particles->mass, from->masses, n);
+    get_words(particles->id, from->ids, n);
+    get_doubles(particles->wall_position, from->wall_position, m * d);
+    get_doubles(particles->wall_normal, from->wall_normal, m * d);
+    get_integers(particles->wall_impulse, from->wall_impulse, m * d);
+    get_words(particles->wall_id, from->wall_ids, m);
+    for (size_t i = 0; i < m; i++)
+        particles->wall_body[i] = (int32_t)get_word(from->wall_bodies + 8 * i);
+}
+
+ascc_status ascc_particles_restore(ascc_particles *particles, const void *memory, size_t size)
+{
+    if (!ascc_particles_is_set(particles))
         return ASCC_ERROR_ARGUMENT;
-    if (!memory)
-        return ascc_particles_fail(p, ASCC_ERROR_ARGUMENT, "memory: missing");
-    snapshot s = {0};
-    ascc_status status = read_header(p, memory, size, &s);
-    if (status != ASCC_OK)
-        return status;
-    if (!content_valid(&s, (size_t)p->dimension))
-        return ascc_particles_fail(p, ASCC_ERROR_FORMAT,
-                                   "snapshot: a value in it is one that no set holds");
-    status = ascc_particles_reserve(p, (size_t)s.fluid, (size_t)s.boundary);
-    if (status == ASCC_OK)
-        copy_content(p, &s);
-    return status;
+    if (memory == NULL)
+        return ascc_particles_fail(particles, ASCC_ERROR_ARGUMENT, "memory: NULL");
+    snapshot from = {0};
+    const char *why = NULL;
+    if (!open_snapshot(memory, size, &from, &why))
+        return ascc_particles_fail(particles, ASCC_ERROR_FORMAT, "memory: %s", why);
+    if (from.dimension != ascc_particles_width(particles))
+        return ascc_particles_fail(particles, ASCC_ERROR_MISMATCH,
+                                   "memory: a snapshot of dimension %zu, the set has %ld",
+                                   from.dimension, (long)particles->dimension);
+    why = check_snapshot(&from);
+    if (why != NULL)
+        return ascc_particles_fail(particles, ASCC_ERROR_FORMAT, "memory: %s", why);
+    if (!ascc_particles_make_room(particles, from.fluid, from.boundary))
+        return ascc_particles_fail(particles, ASCC_ERROR_MEMORY,
+                                   "out of memory for %zu fluid and %zu boundary particles",
+                                   from.fluid, from.boundary);
+    become(particles, &from);
+    return ASCC_OK;
+}
+
+/* ---- Hash ------------------------------------------------------------------------------------ */
+
+/* The finaliser of splitmix64: every bit of the input changes half of the output's. */
+static uint64_t mix(uint64_t hash, uint64_t word)
+{
+    hash = (hash ^ word) + UINT64_C(0x9e3779b97f4a7c15);
+    hash = (hash ^ hash >> 30) * UINT64_C(0xbf58476d1ce4e5b9);
+    hash = (hash ^ hash >> 27) * UINT64_C(0x94d049bb133111eb);
+    return hash ^ hash >> 31;
+}
+
+static uint64_t mix_doubles(uint64_t hash, const double *values, size_t count)
+{
+    for (size_t i = 0; i < count; i++)
+        hash = mix(hash, bits_of(values[i] + 0.0)); /* -0 + 0 is 0 */
+    return hash;
+}
+
+/* A sum over particles, so that their order does not matter. */
+uint64_t ascc_particles_hash(const ascc_particles *particles)
+{
+    if (!ascc_particles_is_set(particles))
+        return 0;
+    const size_t d = ascc_particles_width(particles);
+    uint64_t hash = mix(0, d);
+    hash = mix(hash, particles->fluid_count);
+    hash = mix(hash, particles->boundary_count);
+    hash = mix(hash, bits_of(particles->quantum));
+    for (size_t row = 0; row < particles->fluid_count; row++) {
+        uint64_t one = mix_doubles(mix(0, ASCC_FLUID), particles->position + row * d, d);
+        for (size_t c = 0; c < d; c++)
+            one = mix(one, (uint64_t)particles->momentum[row * d + c]);
+        hash += mix_doubles(one, particles->mass + row, 1);
+    }
+    for (size_t row = 0; row < particles->boundary_count; row++) {
+        uint64_t one = mix_doubles(mix(0, ASCC_BOUNDARY), particles->wall_position + row * d, d);
+        one = mix_doubles(one, particles->wall_normal + row * d, d);
+        hash += mix(one, (uint64_t)particles->wall_body[row]);
+    }
+    return hash;
 }

@@ -1,31 +1,34 @@
-/* The text of each status, failure messages, and structs that begin with their size.
- * SPDX-License-Identifier: MIT */
+/* Texts: what a status means, which version runs, and the line about a failure; and public structs
+ * of other sizes than ours. SPDX-License-Identifier: MIT */
+#include "common.h"
+
 #include <stdio.h>
 #include <string.h>
 
-#include "common.h"
+/* A size above this was never a struct of ours but memory that nobody set. */
+#define PLAUSIBLE_STRUCT_SIZE 4096
 
 const char *ascc_status_text(ascc_status status)
 {
     switch (status) {
     case ASCC_OK:
-        return "success";
+        return "ok";
     case ASCC_ERROR_ARGUMENT:
-        return "an argument is not accepted";
+        return "argument not accepted";
     case ASCC_ERROR_MEMORY:
         return "out of memory";
     case ASCC_ERROR_FILE:
-        return "a file could not be opened, read or written";
+        return "file could not be opened, read or written";
     case ASCC_ERROR_FORMAT:
-        return "not a format this version understands";
+        return "content not understood";
     case ASCC_ERROR_NOT_FINITE:
-        return "a number is not finite";
+        return "value not finite";
     case ASCC_ERROR_RANGE:
-        return "a number is out of range";
+        return "value out of range";
     case ASCC_ERROR_MISMATCH:
         return "handles do not go together";
     case ASCC_ERROR_LIMIT:
-        return "more neighbours than allowed";
+        return "too many neighbours";
     }
     return "unknown status";
 }
@@ -35,12 +38,22 @@ int32_t ascc_version(void)
     return ASCC_VERSION_MAJOR * 10000 + ASCC_VERSION_MINOR * 100 + ASCC_VERSION_PATCH;
 }
 
+/* Formats beside the message first: an argument may be the message itself. What is not printable in
+ * ASCII (a path may hold a newline) becomes '?', except bytes of UTF-8. */
 ascc_status ascc_fail(ascc_message *message, ascc_status status, const char *format, ...)
 {
+    char text[ASCC_MESSAGE_CAPACITY];
     va_list arguments;
     va_start(arguments, format);
-    (void)vsnprintf(message->text, sizeof message->text, format, arguments);
+    if (vsnprintf(text, sizeof text, format, arguments) < 0)
+        text[0] = '\0';
     va_end(arguments);
+    for (char *c = text; *c != '\0'; c++) {
+        const unsigned char byte = (unsigned char)*c;
+        if (byte < 0x20 || byte == 0x7f)
+            *c = '?';
+    }
+    memcpy(message->text, text, sizeof text);
     return status;
 }
 
@@ -48,11 +61,11 @@ bool ascc_read_struct(void *into, size_t into_size, const void *from, size_t fir
 {
     size_t size;
     memcpy(&size, from, sizeof size);
-    if (size < first_size || size > 65536)
+    if (size < first_size || size > PLAUSIBLE_STRUCT_SIZE)
         return false;
-    const unsigned char *bytes = from;
+    const unsigned char *const bytes = from;
     for (size_t i = into_size; i < size; i++)
-        if (bytes[i])
+        if (bytes[i] != 0)
             return false;
     memset(into, 0, into_size);
     memcpy(into, from, ascc_min_size(size, into_size));
@@ -63,7 +76,7 @@ bool ascc_write_struct(void *into, const void *from, size_t from_size, size_t fi
 {
     size_t size;
     memcpy(&size, into, sizeof size);
-    if (size < first_size)
+    if (size < first_size || size > PLAUSIBLE_STRUCT_SIZE)
         return false;
     memcpy(into, from, ascc_min_size(size, from_size));
     memcpy(into, &size, sizeof size);

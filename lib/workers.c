@@ -1,209 +1,296 @@
-/* A pool of threads, or the host's job system, working off blocks. SPDX-License-Identifier: MIT */
+/* Runs a function over [0, count) in blocks fixed by index, on all workers of a context.
+ * SPDX-License-Identifier: MIT
+ *
+ * One job at a time. A ticket says which job it is and how many of its blocks nobody has taken yet:
+ *
+ *     ticket = | number of the job, 32 bits | blocks left, 32 bits |
+ *
+ * A worker reads the ticket, then the job, and takes a block by exchanging the ticket for one with
+ * a block less. If that succeeds the ticket did not change in between, so the job had an unfinished
+ * block all the time and what was read of it is whole. Who comes late finds no block left and
+ * touches nothing: so a job is over when its blocks are done, and nobody waits for a sleeper.
+ */
 #include "workers.h"
 
 #include <pthread.h>
+#include <sched.h>
 #include <stdatomic.h>
-#include <string.h>
 
-/* Looks at a flag this often before going to sleep: some microseconds. */
-#define SPIN 2000
+/* Turns of sched_yield before an idle thread goes to sleep: some microseconds. */
+#define IDLE_TURNS 32
 
-typedef struct job {
-    size_t count, block;
-    ascc_range_function function;
-    void *data;
-    atomic_size_t next; /* first index not yet taken */
-} job;
+typedef struct worker {
+    pthread_t thread;
+    ascc_workers *workers;
+    int32_t slot;
+} worker;
 
 struct ascc_workers {
+    _Alignas(ASCC_ALIGNMENT) _Atomic uint64_t ticket;
+    _Alignas(ASCC_ALIGNMENT) _Atomic uint32_t done; /* blocks of the job that are finished */
+    _Atomic bool caller_sleeps;
+    atomic_flag taken; /* a caller has the pool */
+
+    /* The job. Atomic only because late workers may read it while the next one is written. */
+    _Alignas(ASCC_ALIGNMENT) _Atomic(ascc_range_function) function;
+    _Atomic(void *) data;
+    _Atomic size_t count, block;
+    _Atomic uint32_t blocks;
+
+    /* Sleep and waking. */
+    pthread_mutex_t lock;
+    pthread_cond_t wake, finished;
+    _Atomic int32_t sleepers;
+    bool stop; /* under lock */
+
     ascc_allocator allocator;
-    int32_t count;
     void *(*enqueue)(void *, ascc_task, void *, int32_t);
     void (*finish)(void *, void *);
     void *user;
-
-    pthread_mutex_t owner; /* held by the caller whose job the pool works on */
-    pthread_mutex_t lock;  /* of the sleepers */
-    pthread_cond_t wake, done;
-    atomic_uint turn;   /* odd steps of two; bit 0: stop */
-    atomic_int working; /* pool threads that have not finished this turn */
-    job *current;
-    int32_t started;
-    pthread_t *thread;
-    struct ascc_worker {
-        ascc_workers *workers;
-        int32_t slot;
-    } * worker;
+    size_t size; /* of this struct with its threads */
+    int32_t thread_count;
+    int32_t started; /* entries of own that run */
+    worker own[];    /* thread_count - 1, without a host's job system */
 };
 
-static inline void relax(void)
+static uint32_t blocks_left(uint64_t ticket)
 {
-#if defined(__x86_64__) || defined(__i386__)
-    __builtin_ia32_pause();
-#endif
+    return (uint32_t)ticket;
 }
 
-static void work(job *j, int32_t slot)
+/* Counts a block as done, and wakes the caller after the last one. Sequential consistency: either
+ * we see that the caller sleeps, or it sees our count before it goes to sleep. */
+static void finish_block(ascc_workers *workers, uint32_t blocks)
 {
-    for (;;) {
-        const size_t begin = atomic_fetch_add_explicit(&j->next, j->block, memory_order_relaxed);
-        if (begin >= j->count)
+    if (atomic_fetch_add(&workers->done, 1) + 1 == blocks && atomic_load(&workers->caller_sleeps)) {
+        pthread_mutex_lock(&workers->lock);
+        pthread_cond_signal(&workers->finished);
+        pthread_mutex_unlock(&workers->lock);
+    }
+}
+
+/* Does blocks until none is left. */
+static void take_blocks(ascc_workers *workers, int32_t slot)
+{
+    uint64_t ticket = atomic_load_explicit(&workers->ticket, memory_order_acquire);
+    while (blocks_left(ticket) != 0) {
+        const ascc_range_function function =
+            atomic_load_explicit(&workers->function, memory_order_relaxed);
+        void *const data = atomic_load_explicit(&workers->data, memory_order_relaxed);
+        const size_t count = atomic_load_explicit(&workers->count, memory_order_relaxed);
+        const size_t block = atomic_load_explicit(&workers->block, memory_order_relaxed);
+        const uint32_t blocks = atomic_load_explicit(&workers->blocks, memory_order_relaxed);
+        if (!atomic_compare_exchange_weak_explicit(&workers->ticket, &ticket, ticket - 1,
+                                                   memory_order_acq_rel, memory_order_acquire))
+            continue;
+        const size_t begin = (size_t)(blocks - blocks_left(ticket)) * block;
+        function(data, begin, begin + ascc_min_size(block, count - begin), slot);
+        finish_block(workers, blocks);
+        ticket = atomic_load_explicit(&workers->ticket, memory_order_acquire);
+    }
+}
+
+/* ---- Own threads ----------------------------------------------------------------------------- */
+
+/* Waits until there is a block to take; false: stop. */
+static bool wait_for_blocks(ascc_workers *workers)
+{
+    for (int turn = 0; turn < IDLE_TURNS; turn++) {
+        if (blocks_left(atomic_load_explicit(&workers->ticket, memory_order_relaxed)) != 0)
+            return true;
+        sched_yield();
+    }
+    pthread_mutex_lock(&workers->lock);
+    atomic_fetch_add(&workers->sleepers, 1);
+    while (!workers->stop && blocks_left(atomic_load(&workers->ticket)) == 0)
+        pthread_cond_wait(&workers->wake, &workers->lock);
+    atomic_fetch_sub(&workers->sleepers, 1);
+    const bool stop = workers->stop;
+    pthread_mutex_unlock(&workers->lock);
+    return !stop;
+}
+
+static void *work(void *argument)
+{
+    const worker *const self = argument;
+    while (wait_for_blocks(self->workers))
+        take_blocks(self->workers, self->slot);
+    return NULL;
+}
+
+/* Wakes no more sleepers than there are blocks for. */
+static void wake_sleepers(ascc_workers *workers, uint32_t blocks)
+{
+    const int32_t sleepers = atomic_load(&workers->sleepers);
+    if (sleepers == 0)
+        return;
+    pthread_mutex_lock(&workers->lock);
+    for (int32_t i = 0; i < sleepers && (uint32_t)i + 1 < blocks; i++)
+        pthread_cond_signal(&workers->wake);
+    pthread_mutex_unlock(&workers->lock);
+}
+
+/* Waits for blocks that other workers still have in hand. */
+static void wait_for_done(ascc_workers *workers, uint32_t blocks)
+{
+    for (int turn = 0; turn < IDLE_TURNS; turn++) {
+        if (atomic_load_explicit(&workers->done, memory_order_acquire) == blocks)
             return;
-        const size_t left = j->count - begin;
-        j->function(j->data, begin, begin + (left < j->block ? left : j->block), slot);
+        sched_yield();
     }
+    pthread_mutex_lock(&workers->lock);
+    atomic_store(&workers->caller_sleeps, true);
+    while (atomic_load(&workers->done) != blocks)
+        pthread_cond_wait(&workers->finished, &workers->lock);
+    atomic_store(&workers->caller_sleeps, false);
+    pthread_mutex_unlock(&workers->lock);
 }
 
-/* Waits until the turn is another one and returns it. */
-static unsigned next_turn(ascc_workers *w, unsigned seen)
+/* ---- The host's job system ------------------------------------------------------------------- */
+
+static void host_task(void *argument, int32_t index)
 {
-    for (int i = 0; i < SPIN; i++) {
-        const unsigned turn = atomic_load_explicit(&w->turn, memory_order_acquire);
-        if (turn != seen)
-            return turn;
-        relax();
-    }
-    pthread_mutex_lock(&w->lock);
-    while (atomic_load_explicit(&w->turn, memory_order_acquire) == seen)
-        pthread_cond_wait(&w->wake, &w->lock);
-    pthread_mutex_unlock(&w->lock);
-    return atomic_load_explicit(&w->turn, memory_order_acquire);
+    take_blocks(argument, index);
 }
 
-static void *thread_main(void *argument)
-{
-    struct ascc_worker *self = argument;
-    ascc_workers *w = self->workers;
-    unsigned turn = 0;
-    for (;;) {
-        turn = next_turn(w, turn);
-        if (turn & 1u)
-            return NULL;
-        work(w->current, self->slot);
-        if (atomic_fetch_sub_explicit(&w->working, 1, memory_order_acq_rel) == 1) {
-            pthread_mutex_lock(&w->lock);
-            pthread_cond_signal(&w->done);
-            pthread_mutex_unlock(&w->lock);
-        }
-    }
-}
+/* ---- Life ------------------------------------------------------------------------------------ */
 
-static void announce(ascc_workers *w, unsigned step)
+static bool start_threads(ascc_workers *workers)
 {
-    pthread_mutex_lock(&w->lock);
-    atomic_fetch_add_explicit(&w->turn, step, memory_order_acq_rel);
-    pthread_cond_broadcast(&w->wake);
-    pthread_mutex_unlock(&w->lock);
-}
-
-static bool start_threads(ascc_workers *w)
-{
-    const size_t extra = (size_t)w->count - 1;
-    w->thread = ascc_allocate(&w->allocator, extra, sizeof *w->thread);
-    w->worker = ascc_allocate(&w->allocator, extra, sizeof *w->worker);
-    if (!w->thread || !w->worker)
-        return false;
-    for (; w->started < w->count - 1; w->started++) {
-        w->worker[w->started].workers = w;
-        w->worker[w->started].slot = w->started + 1;
-        if (pthread_create(&w->thread[w->started], NULL, thread_main, &w->worker[w->started]))
+    while (workers->started < workers->thread_count - 1) {
+        worker *const next = &workers->own[workers->started];
+        *next = (worker){.workers = workers, .slot = workers->started + 1};
+        if (pthread_create(&next->thread, NULL, work, next) != 0)
             return false;
+        workers->started++;
     }
     return true;
+}
+
+static bool open_locks(ascc_workers *workers)
+{
+    if (pthread_mutex_init(&workers->lock, NULL) != 0)
+        return false;
+    if (pthread_cond_init(&workers->wake, NULL) == 0) {
+        if (pthread_cond_init(&workers->finished, NULL) == 0)
+            return true;
+        pthread_cond_destroy(&workers->wake);
+    }
+    pthread_mutex_destroy(&workers->lock);
+    return false;
 }
 
 ascc_status ascc_workers_create(const ascc_allocator *allocator, int32_t thread_count,
                                 void *(*enqueue)(void *, ascc_task, void *, int32_t),
                                 void (*finish)(void *, void *), void *user, ascc_workers **workers)
 {
-    assert(thread_count >= 1);
-    ascc_workers *w = ascc_allocate(allocator, 1, sizeof *w);
     *workers = NULL;
-    if (!w)
+    const size_t own = enqueue == NULL ? (size_t)thread_count - 1 : 0;
+    const size_t size = sizeof(ascc_workers) + own * sizeof(worker);
+    ascc_workers *made = ascc_allocate(allocator, 1, size);
+    if (made == NULL)
         return ASCC_ERROR_MEMORY;
-    memset(w, 0, sizeof *w);
-    w->allocator = *allocator;
-    w->count = thread_count;
-    w->enqueue = enqueue;
-    w->finish = finish;
-    w->user = user;
-    pthread_mutex_init(&w->owner, NULL);
-    pthread_mutex_init(&w->lock, NULL);
-    pthread_cond_init(&w->wake, NULL);
-    pthread_cond_init(&w->done, NULL);
-    if (!enqueue && thread_count > 1 && !start_threads(w)) {
-        ascc_workers_destroy(&w);
+
+    atomic_init(&made->ticket, 0);
+    atomic_init(&made->done, 0);
+    atomic_init(&made->caller_sleeps, false);
+    atomic_flag_clear(&made->taken);
+    atomic_init(&made->function, NULL);
+    atomic_init(&made->data, NULL);
+    atomic_init(&made->count, 0);
+    atomic_init(&made->block, 0);
+    atomic_init(&made->blocks, 0);
+    atomic_init(&made->sleepers, 0);
+    made->stop = false;
+    made->allocator = *allocator;
+    made->enqueue = enqueue;
+    made->finish = finish;
+    made->user = user;
+    made->size = size;
+    made->thread_count = thread_count;
+    made->started = 0;
+
+    if (!open_locks(made)) {
+        ascc_release(allocator, made, 1, size);
         return ASCC_ERROR_MEMORY;
     }
-    *workers = w;
+    if (enqueue == NULL && !start_threads(made)) {
+        ascc_workers_destroy(&made);
+        return ASCC_ERROR_MEMORY;
+    }
+    *workers = made;
     return ASCC_OK;
 }
 
 void ascc_workers_destroy(ascc_workers **workers)
 {
-    ascc_workers *w = *workers;
-    if (!w)
+    ascc_workers *const old = *workers;
+    if (old == NULL)
         return;
     *workers = NULL;
-    if (w->started) {
-        announce(w, 1);
-        for (int32_t i = 0; i < w->started; i++)
-            pthread_join(w->thread[i], NULL);
-    }
-    pthread_cond_destroy(&w->done);
-    pthread_cond_destroy(&w->wake);
-    pthread_mutex_destroy(&w->lock);
-    pthread_mutex_destroy(&w->owner);
-    const size_t extra = (size_t)w->count - 1;
-    ascc_release(&w->allocator, w->thread, extra, sizeof *w->thread);
-    ascc_release(&w->allocator, w->worker, extra, sizeof *w->worker);
-    const ascc_allocator allocator = w->allocator;
-    ascc_release(&allocator, w, 1, sizeof *w);
+    pthread_mutex_lock(&old->lock);
+    old->stop = true;
+    pthread_cond_broadcast(&old->wake);
+    pthread_mutex_unlock(&old->lock);
+    for (int32_t i = 0; i < old->started; i++)
+        pthread_join(old->own[i].thread, NULL);
+    pthread_cond_destroy(&old->finished);
+    pthread_cond_destroy(&old->wake);
+    pthread_mutex_destroy(&old->lock);
+    const ascc_allocator allocator = old->allocator;
+    ascc_release(&allocator, old, 1, old->size);
 }
 
 int32_t ascc_workers_count(const ascc_workers *workers)
 {
-    return workers->count;
+    return workers->thread_count;
 }
 
-static void host_task(void *data, int32_t index)
+/* ---- Run ------------------------------------------------------------------------------------- */
+
+static void run_alone(size_t count, size_t block, ascc_range_function function, void *data)
 {
-    work(data, index);
+    for (size_t begin = 0; begin < count;) {
+        const size_t end = begin + ascc_min_size(block, count - begin);
+        function(data, begin, end, 0);
+        begin = end;
+    }
 }
 
-static void run_on_pool(ascc_workers *w, job *j)
+static void publish(ascc_workers *workers, size_t count, size_t block, uint32_t blocks,
+                    ascc_range_function function, void *data)
 {
-    w->current = j;
-    atomic_store_explicit(&w->working, w->count - 1, memory_order_relaxed);
-    announce(w, 2);
-    work(j, 0);
-    for (int i = 0; i < SPIN; i++) {
-        if (!atomic_load_explicit(&w->working, memory_order_acquire))
-            return;
-        relax();
-    }
-    pthread_mutex_lock(&w->lock);
-    while (atomic_load_explicit(&w->working, memory_order_acquire))
-        pthread_cond_wait(&w->done, &w->lock);
-    pthread_mutex_unlock(&w->lock);
+    atomic_store_explicit(&workers->function, function, memory_order_relaxed);
+    atomic_store_explicit(&workers->data, data, memory_order_relaxed);
+    atomic_store_explicit(&workers->count, count, memory_order_relaxed);
+    atomic_store_explicit(&workers->block, block, memory_order_relaxed);
+    atomic_store_explicit(&workers->blocks, blocks, memory_order_relaxed);
+    atomic_store_explicit(&workers->done, 0, memory_order_relaxed);
+    const uint64_t number =
+        (atomic_load_explicit(&workers->ticket, memory_order_relaxed) >> 32) + 1;
+    atomic_store(&workers->ticket, number << 32 | blocks);
 }
 
-void ascc_workers_run(ascc_workers *w, size_t count, size_t block, ascc_range_function function,
-                      void *data)
+void ascc_workers_run(ascc_workers *workers, size_t count, size_t block,
+                      ascc_range_function function, void *data)
 {
-    job j = {.count = count, .block = block, .function = function, .data = data};
-    if (count <= block || w->count == 1) {
-        work(&j, 0);
+    assert(block > 0);
+    const size_t blocks = count / block + (count % block != 0);
+    if (blocks <= 1 || blocks > UINT32_MAX || workers->thread_count == 1 ||
+        atomic_flag_test_and_set_explicit(&workers->taken, memory_order_acquire)) {
+        run_alone(count, block, function, data);
         return;
     }
-    if (w->enqueue) {
-        w->finish(w->user, w->enqueue(w->user, host_task, &j, w->count));
-        return;
+
+    publish(workers, count, block, (uint32_t)blocks, function, data);
+    if (workers->enqueue != NULL) {
+        void *const token =
+            workers->enqueue(workers->user, host_task, workers, workers->thread_count);
+        workers->finish(workers->user, token);
+    } else {
+        wake_sleepers(workers, (uint32_t)blocks);
     }
-    if (pthread_mutex_trylock(&w->owner) != 0) { /* the pool is busy with another caller */
-        work(&j, 0);
-        return;
-    }
-    run_on_pool(w, &j);
-    pthread_mutex_unlock(&w->owner);
+    take_blocks(workers, 0); /* with a host's job system none is left */
+    wait_for_done(workers, (uint32_t)blocks);
+    atomic_flag_clear_explicit(&workers->taken, memory_order_release);
 }

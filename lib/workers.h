@@ -21,7 +21,8 @@ int32_t ascc_workers_count(const ascc_workers *workers);
 
 /* Cuts [0, count) into blocks of `block` (the last may be shorter), calls the function once for
  * each and returns when all are done. The caller works too. Several threads may call at once: one
- * of them gets the pool, the others do their blocks alone. */
+ * of them gets the pool, the others do their blocks alone, each with slot 0: what a slot stands for
+ * belongs to one call. */
 void ascc_workers_run(ascc_workers *workers, size_t count, size_t block,
                       ascc_range_function function, void *data);
 

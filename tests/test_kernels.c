@@ -338,7 +338,7 @@ static void multiply_equals_doubles_and_has_the_same_bits_on_every_cpu(void **st
     ascc_kernels table[16];
     const int count = tables(table);
     for (size_t n = 0; n <= 17; n++)
-        for (size_t b = 8; b <= 40; b += 8)
+        for (size_t b = 8; b <= 56; b += 8)
             for (size_t a = 0; a <= 72; a += 24) {
                 const size_t stride = a + 3, out_stride = b + 5;
                 float *in = floats(n * stride + 1), *weight = floats(a * b + 1);

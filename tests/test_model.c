@@ -371,6 +371,56 @@ static void model_outlives_its_context(void **state)
     ascc_model_release(held);
 }
 
+/* The example of docs/file-format.md, with tensors of the shapes that its table states. */
+static void documented_example_loads(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *name;
+        int rank;
+        size_t shape[5];
+    } tensors[] = {{"l0.fluid.kernel", 5, {1, 4, 4, 3, 4}},
+                   {"l0.boundary.kernel", 5, {1, 4, 4, 3, 4}},
+                   {"l0.fluid.bias", 1, {4}},
+                   {"l0.boundary.bias", 1, {4}},
+                   {"l1.kernel", 5, {1, 4, 4, 8, 8}},
+                   {"l2.kernel", 5, {1, 4, 4, 8, 8}},
+                   {"l1.bias", 1, {8}},
+                   {"l2.bias", 1, {8}},
+                   {"l2.dense.bias", 1, {8}},
+                   {"l2.dense.weight", 2, {8, 8}},
+                   {"output.kernel", 5, {1, 3, 6, 8, 2}}};
+    static char page[1 << 16];
+    static const float values[1024] = {1.0f};
+    FILE *file = fopen(SOURCE_ROOT "/docs/file-format.md", "rb");
+    assert_non_null(file);
+    page[fread(page, 1, sizeof page - 1, file)] = '\0';
+    fclose(file);
+    char *begin = strstr(page, "```json\n");
+    assert_non_null(begin);
+    begin += 8;
+    char *end = strstr(begin, "```");
+    assert_non_null(end);
+    *end = '\0';
+    for (char *c = begin; *c != '\0'; c++)
+        if (*c == '\n')
+            *c = ' ';
+    model_builder builder;
+    model_builder_open(&builder);
+    model_builder_metadata(&builder, "format", "ascc.model");
+    model_builder_metadata(&builder, "version", "1");
+    model_builder_metadata(&builder, "licence", "other keys are carried along");
+    model_builder_metadata(&builder, "network", begin);
+    for (size_t i = 0; i < sizeof tensors / sizeof *tensors; i++)
+        model_builder_tensor(&builder, tensors[i].name, tensors[i].rank, tensors[i].shape, values);
+    size_t size;
+    unsigned char *bytes = model_builder_finish(&builder, &size);
+    ascc_model *model = must_load(bytes, size);
+    check_plan(model);
+    assert_string_equal(model->plan.name, "example-2d");
+    ascc_model_destroy(&model);
+}
+
 /* ---- What is refused ---------------------------------------------------------------------------- */
 
 static const char base_network[] =
@@ -1041,6 +1091,7 @@ int main(void)
         cmocka_unit_test(demonstration_models_are_antisymmetric_and_radial),
         cmocka_unit_test(halves_are_mirrored_along_each_axis),
         cmocka_unit_test(plan_says_what_the_file_says),
+        cmocka_unit_test(documented_example_loads),
         cmocka_unit_test(saved_again_is_byte_identical),
         cmocka_unit_test(arguments_and_paths_are_checked),
         cmocka_unit_test(model_outlives_its_context),

@@ -32,8 +32,7 @@ static ascc_status build(search_case *s, test_tools *t, const double *query, siz
                           .source_grid = &s->source_grid,
                           .radius = r,
                           .same = !source,
-                          .max_neighbors = 100000,
-                          .mapping = -1};
+                          .max_neighbors = 100000};
     if (status == ASCC_OK)
         status = ascc_rows_open(&s->rows, &t->search, 1);
     return status;

@@ -12,6 +12,7 @@ static const struct {
 } commands[] = {
     {"sim", "run a model on a scene", ascc_command_sim},
     {"info", "describe a model or sequence file", ascc_command_info},
+    {"eval", "measure a method on true sequences", ascc_command_eval},
 };
 
 static void usage(FILE *out)

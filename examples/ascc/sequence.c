@@ -8,6 +8,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 
 #include <jansson.h>
 
@@ -46,14 +47,14 @@ static bool read_bytes(file *f)
     FILE *in = fopen(f->report.path, "rb");
     if (!in)
         return fail(&f->report, "%s", strerror(errno));
-    bool good = fseek(in, 0, SEEK_END) == 0;
-    const long size = good ? ftell(in) : -1;
-    good = size >= 0 && fseek(in, 0, SEEK_SET) == 0;
-    if (good) {
-        f->size = (size_t)size;
-        f->bytes = malloc(f->size + 1);
-        good = f->bytes && fread(f->bytes, 1, f->size, in) == f->size;
+    struct stat about;
+    if (fstat(fileno(in), &about) != 0 || !S_ISREG(about.st_mode)) {
+        (void)fclose(in);
+        return fail(&f->report, "is no regular file");
     }
+    f->size = (size_t)about.st_size;
+    f->bytes = malloc(f->size + 1);
+    const bool good = f->bytes && fread(f->bytes, 1, f->size, in) == f->size;
     (void)fclose(in);
     return good || fail(&f->report, "cannot be read");
 }
@@ -172,8 +173,9 @@ static bool tensor(const file *f, const char *name, size_t rank, size_t dimensio
                     shape[rank - 1], dimension);
     const json_int_t begin = json_integer_value(json_array_get(offsets, 0)),
                      end = json_integer_value(json_array_get(offsets, 1));
-    if (begin < 0 || end < begin || (size_t)end > f->size - f->data ||
-        (size_t)(end - begin) != bytes)
+    if (!json_is_integer(json_array_get(offsets, 0)) ||
+        !json_is_integer(json_array_get(offsets, 1)) || begin < 0 || end < begin ||
+        (size_t)end > f->size - f->data || (size_t)(end - begin) != bytes)
         return fail(&f->report, "tensor %s: its offsets do not hold its shape", name);
     *values = malloc(bytes + 1);
     if (!*values)
@@ -241,6 +243,7 @@ struct ascc_sequence_writer {
         *velocities;      /* positions behind room for the header; velocities apart till the end */
     ascc_sequence header; /* walls copied */
     bool all_velocities;
+    bool broken; /* a frame was written in part */
 };
 
 static bool out_of_order(const report *r)
@@ -325,13 +328,12 @@ bool ascc_sequence_append(ascc_sequence_writer *w, const float *position, const 
 {
     const report r = {w->path, error, capacity};
     const size_t n = w->header.count * (size_t)w->header.dimension;
-    if (fwrite(position, sizeof(float), n, w->out) != n)
+    const bool moving = w->all_velocities || w->header.frames == 0;
+    w->broken = w->broken || fwrite(position, sizeof(float), n, w->out) != n ||
+                (moving && fwrite(velocity, sizeof(float), n, w->velocities) != n);
+    if (w->broken)
         return out_of_order(&r);
-    if (w->all_velocities || w->header.frames == 0) {
-        if (fwrite(velocity, sizeof(float), n, w->velocities) != n)
-            return out_of_order(&r);
-        w->header.velocity_frames++;
-    }
+    w->header.velocity_frames += moving;
     w->header.frames++;
     return true;
 }
@@ -428,7 +430,7 @@ bool ascc_sequence_finish(ascc_sequence_writer *w, bool keep, char *error, size_
     const size_t walls = w->header.walls * (size_t)w->header.dimension;
     bool good = true;
     if (keep) {
-        good = append_file(w->out, w->velocities) &&
+        good = !w->broken && append_file(w->out, w->velocities) &&
                fwrite(w->header.wall, sizeof(float), walls, w->out) == walls &&
                fwrite(w->header.normal, sizeof(float), walls, w->out) == walls && write_header(w);
         good = fclose(w->out) == 0 && good;

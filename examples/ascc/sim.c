@@ -7,6 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
+#include <unistd.h>
 
 #include "commands.h"
 #include "host.h"
@@ -19,15 +20,18 @@ typedef struct options {
     const char *model, *scene, *out, *frames, *ply;
     int32_t steps, every, threads, size;
     double time_step, spacing;
-    bool has_gravity, difference;
+    int32_t gravity_count; /* 0 = the scene's */
+    bool difference;
     double gravity[3];
 } options;
 
 static void usage(FILE *to)
 {
-    fprintf(to, "usage: ascc sim MODEL SCENE -n STEPS [-o OUT] [options]\n\n"
-                "MODEL  a model file, or demo (a demonstration model, not trained)\n"
-                "SCENE  a sequence file, whose first frame starts the run, or one of\n");
+    fprintf(
+        to,
+        "usage: ascc sim MODEL SCENE -n STEPS [-o OUT] [options]\n\n"
+        "MODEL  a model file, or demo (a demonstration model, not trained)\n"
+        "SCENE  a sequence file, whose first frame starts the run, or one of (3D without -2d)\n");
     for (const ascc_scene_name *s = ascc_scene_names; s->name; s++)
         fprintf(to, "         %s-2d, %s-3d: %s\n", s->name, s->name, s->text);
     fprintf(to, "\n"
@@ -40,7 +44,7 @@ static void usage(FILE *to)
                 "  --dt S             time step, seconds (the model's)\n"
                 "  --gravity X,Y[,Z]  m/s^2 (the scene's)\n"
                 "  --size N           particles along a named scene's longest edge\n"
-                "  --spacing S        particle spacing of a named scene, metres (0.05)\n"
+                "  --spacing S        particle spacing of a named scene, metres (the model's)\n"
                 "  --velocity KIND    of a sequence: stored (default), or difference of its first\n"
                 "                     two frames, starting from the second\n");
 }
@@ -68,18 +72,20 @@ static bool whole(const char *name, const char *text, long low, long high, int32
     return true;
 }
 
-static bool real(const char *name, const char *text, double *value)
+static bool real(const char *name, const char *text, double low, double high, double *value)
 {
     char *end;
     *value = strtod(text, &end);
-    if (*end || end == text || !isfinite(*value) || *value <= 0.0) {
-        fprintf(stderr, "ascc sim: %s %s: a positive number is wanted\n", name, text);
+    if (*end || end == text || !(*value >= low && *value <= high)) {
+        fprintf(stderr, "ascc sim: %s %s: a number from %g to %g is wanted\n", name, text, low,
+                high);
         return false;
     }
     return true;
 }
 
-static bool vector(const char *name, const char *text, double value[3])
+/* Two or three numbers; *count says how many. */
+static bool vector(const char *name, const char *text, double value[3], int32_t *count)
 {
     const char *at = text;
     for (int c = 0; c < 3; c++) {
@@ -87,6 +93,7 @@ static bool vector(const char *name, const char *text, double value[3])
         value[c] = strtod(at, &end);
         if (end == at || !isfinite(value[c]))
             break;
+        *count = c + 1;
         if (*end == '\0' && c > 0)
             return true;
         if (*end != ',')
@@ -114,11 +121,11 @@ static bool read_option(options *o, const char *name, const char *value)
     if (strcmp(name, "--size") == 0)
         return whole(name, value, 4, 1000, &o->size);
     if (strcmp(name, "--dt") == 0)
-        return real(name, value, &o->time_step);
+        return real(name, value, 1e-9, 1e9, &o->time_step);
     if (strcmp(name, "--spacing") == 0)
-        return real(name, value, &o->spacing);
+        return real(name, value, 1e-6, 1e6, &o->spacing);
     if (strcmp(name, "--gravity") == 0)
-        return o->has_gravity = vector(name, value, o->gravity);
+        return vector(name, value, o->gravity, &o->gravity_count);
     if (strcmp(name, "--velocity") == 0 && strcmp(value, "stored") == 0)
         return true;
     if (strcmp(name, "--velocity") == 0 && strcmp(value, "difference") == 0)
@@ -152,21 +159,21 @@ static bool read_arguments(options *o, int argc, char **argv)
 
 /* ---- The scene ---- */
 
-/* A name that ends in -2d or -3d and is no file: a built-in scene. */
-static bool load_scene(const options *o, ascc_sequence *scene, char *error, size_t capacity)
+/* What is no file and is named NAME-2d, NAME-3d or NAME (3D) is a built-in scene. */
+static bool load_scene(const options *o, double spacing, ascc_sequence *scene, char *error,
+                       size_t capacity)
 {
-    const size_t length = strlen(o->scene);
-    FILE *file = fopen(o->scene, "rb");
-    if (file)
-        (void)fclose(file);
-    if (!file && length > 3 &&
-        (strcmp(o->scene + length - 3, "-2d") == 0 || strcmp(o->scene + length - 3, "-3d") == 0)) {
-        char name[64];
-        (void)snprintf(name, sizeof name, "%.*s", (int)(length - 3 < 60 ? length - 3 : 60),
-                       o->scene);
-        return ascc_scene_make(name, o->scene[length - 2] - '0', o->size, o->spacing, scene, error,
-                               capacity);
-    }
+    size_t length = strlen(o->scene);
+    const char *end = o->scene + (length > 3 ? length - 3 : 0);
+    const bool flat = strcmp(end, "-2d") == 0, deep = strcmp(end, "-3d") == 0;
+    char name[64];
+    length -= flat || deep ? 3 : 0;
+    (void)snprintf(name, sizeof name, "%.*s", (int)(length < 63 ? length : 63), o->scene);
+    bool known = flat || deep;
+    for (const ascc_scene_name *s = ascc_scene_names; s->name; s++)
+        known = known || strcmp(s->name, name) == 0;
+    if (known && access(o->scene, F_OK) != 0)
+        return ascc_scene_make(name, flat ? 2 : 3, o->size, spacing, scene, error, capacity);
     return ascc_sequence_read(o->scene, scene, error, capacity);
 }
 
@@ -290,7 +297,7 @@ static void count_step(simulation *s)
 static bool advance(simulation *s)
 {
     const ascc_forces forces = {.size = sizeof forces,
-                                .gravity = s->o->has_gravity ? s->o->gravity : s->scene.gravity};
+                                .gravity = s->o->gravity_count ? s->o->gravity : s->scene.gravity};
     ascc_progress progress;
     ascc_progress_start(&progress, "stepping", (size_t)s->o->steps);
     bool good = write_frame(s);
@@ -315,7 +322,7 @@ static bool advance(simulation *s)
 
 static double potential(const simulation *s, const ascc_measures *m)
 {
-    const double *g = s->o->has_gravity ? s->o->gravity : s->scene.gravity;
+    const double *g = s->o->gravity_count ? s->o->gravity : s->scene.gravity;
     double energy = 0.0;
     for (int c = 0; c < s->scene.dimension; c++)
         energy -= m->mass * g[c] * m->center[c];
@@ -324,7 +331,7 @@ static double potential(const simulation *s, const ascc_measures *m)
 
 static bool weightless(const simulation *s)
 {
-    const double *g = s->o->has_gravity ? s->o->gravity : s->scene.gravity;
+    const double *g = s->o->gravity_count ? s->o->gravity : s->scene.gravity;
     return s->scene.walls == 0 && g[0] == 0.0 && g[1] == 0.0 &&
            (s->scene.dimension == 2 || g[2] == 0.0);
 }
@@ -343,8 +350,10 @@ static void print_momentum(const simulation *s)
            " quanta of %.3g kg m/s%s)\n",
            sqrt(drift) / (sqrt(start) + 1e-10), s->drift[0], s->drift[1], s->drift[2], q,
            info.conserves_momentum ? "" : "; this model does not conserve it");
-    if (!weightless(s))
+    if (!weightless(s)) {
+        printf("angular mom. error  not measured: gravity or walls turn the fluid\n");
         return;
+    }
     double turn = 0.0;
     for (int c = 0; c < 3; c++)
         turn += pow(s->last.angular_momentum[c] - s->first.angular_momentum[c], 2.0);
@@ -375,31 +384,54 @@ static void print_table(const simulation *s)
 
 /* ---- From arguments to table ---- */
 
-static bool open_handles(simulation *s)
+/* The scene and the model. A model file says what spacing a built-in scene gets; the demonstration
+ * model is made for the scene's. */
+static bool open_model(simulation *s)
 {
     const options *o = s->o;
+    const bool demo = strcmp(o->model, "demo") == 0;
     const ascc_context_options context = {.size = sizeof context, .thread_count = o->threads};
+    ascc_model_info info = {.size = sizeof info, .particle_spacing = 0.05};
     ascc_status status = ascc_context_create(&context, &s->context);
-    if (status == ASCC_OK)
+    if (status == ASCC_OK && !demo)
+        status = ascc_host_model(s->context, o->model, 0, 0.0, &s->model);
+    if (status == ASCC_OK && !demo)
+        status = ascc_model_get_info(s->model, &info);
+    const double spacing = o->spacing > 0.0 ? o->spacing : info.particle_spacing;
+    if (status == ASCC_OK && !load_scene(o, spacing, &s->scene, s->error, sizeof s->error))
+        return false;
+    if (status == ASCC_OK && demo)
         status = ascc_host_model(s->context, o->model, s->scene.dimension, 2.0 * s->scene.radius,
                                  &s->model);
+    if (status == ASCC_OK && demo)
+        status = ascc_model_get_info(s->model, &info);
     if (status != ASCC_OK) {
         ascc_host_complain(s->context, o->model, status);
         return false;
     }
+    if (info.dimension != s->scene.dimension)
+        (void)snprintf(s->error, sizeof s->error, "%s is a model in %dD, %s a scene in %dD",
+                       o->model, info.dimension, o->scene, s->scene.dimension);
+    else if (o->gravity_count && o->gravity_count != s->scene.dimension)
+        (void)snprintf(s->error, sizeof s->error, "--gravity has %d numbers, %s %d dimensions",
+                       o->gravity_count, o->scene, s->scene.dimension);
+    else if (s->scene.count == 0)
+        (void)snprintf(s->error, sizeof s->error, "%s: there is no fluid", o->scene);
+    s->time_step = o->time_step > 0.0 ? o->time_step : info.time_step;
+    return !s->error[0];
+}
+
+static bool open_step(simulation *s)
+{
     const float *position;
-    if (!start_of(o, &s->scene, &position, s->error, sizeof s->error))
+    if (!start_of(s->o, &s->scene, &position, s->error, sizeof s->error) ||
+        ascc_host_particles(s->context, &s->scene, position, s->scene.velocity, &s->particles) !=
+            ASCC_OK)
         return false;
-    if (ascc_host_particles(s->context, &s->scene, position, s->scene.velocity, &s->particles) !=
-        ASCC_OK)
-        return false;
-    const ascc_step_options step = {.size = sizeof step, .time_step = o->time_step};
-    status = ascc_step_create(s->context, s->model, &step, &s->step);
+    const ascc_step_options settings = {.size = sizeof settings, .time_step = s->o->time_step};
+    const ascc_status status = ascc_step_create(s->context, s->model, &settings, &s->step);
     if (status != ASCC_OK)
         ascc_host_complain(s->context, "step", status);
-    ascc_model_info info = {.size = sizeof info};
-    (void)ascc_model_get_info(s->model, &info);
-    s->time_step = o->time_step > 0.0 ? o->time_step : info.time_step;
     return status == ASCC_OK;
 }
 
@@ -421,7 +453,7 @@ static bool open_outputs(simulation *s)
         return true;
     ascc_sequence header = s->scene;
     header.time_step = s->time_step * s->o->every;
-    if (s->o->has_gravity)
+    if (s->o->gravity_count)
         memcpy(header.gravity, s->o->gravity, sizeof header.gravity);
     (void)snprintf(header.source, sizeof header.source, "ascc sim %s %s", s->o->model, s->o->scene);
     s->writer = ascc_sequence_create(s->o->out, &header, true, s->error, sizeof s->error);
@@ -446,20 +478,22 @@ int ascc_command_sim(int argc, char **argv)
         usage(stdout);
         return 0;
     }
-    options o = {.every = 1, .threads = 1, .spacing = 0.05};
+    options o = {.every = 1, .threads = 1};
     if (!read_arguments(&o, argc, argv))
         return 2;
     simulation s = {.o = &o};
-    bool good = load_scene(&o, &s.scene, s.error, sizeof s.error) && open_handles(&s) &&
-                open_outputs(&s) && measure(&s, &s.first);
+    bool good = open_model(&s) && open_step(&s) && open_outputs(&s) && measure(&s, &s.first);
     if (good) {
         (void)signal(SIGINT, on_interrupt);
+        (void)signal(SIGTERM, on_interrupt);
         good = advance(&s);
         (void)signal(SIGINT, SIG_DFL);
-        print_table(&s);
+        (void)signal(SIGTERM, SIG_DFL);
+        if (s.steps)
+            print_table(&s);
     }
     char finish[512] = "";
-    /* What was computed before a step failed is kept; a frame that could not be written is not. */
+    /* What was computed before a step failed is kept. */
     if (s.writer && !ascc_sequence_finish(s.writer, s.steps > 0 || good, finish, sizeof finish)) {
         fprintf(stderr, "ascc sim: %s\n", finish);
         good = false;
@@ -469,5 +503,5 @@ int ascc_command_sim(int argc, char **argv)
     if (interrupted)
         fprintf(stderr, "ascc sim: interrupted after %d steps\n", s.steps);
     close_all(&s);
-    return good ? 0 : 1;
+    return !good ? 1 : interrupted ? 130 : 0;
 }

@@ -147,7 +147,7 @@ typedef struct ascc_model_info {
     int32_t level_count;                /* branches of the hierarchy; 1 = particles only */
     int32_t layer_count;                /* values the network computes, last layer included */
     int32_t conserves_momentum;         /* 1: antisymmetric last layer */
-    int32_t conserves_angular_momentum; /* 1: and pair impulses are central */
+    int32_t conserves_angular_momentum; /* 1: and pair impulses are central, at current positions */
     int32_t advected;                   /* 1: the network sees x + dt v*, 0: it sees x */
     int32_t neighbor_limit;             /* most neighbours a point keeps; 0 = all */
     int32_t reserved;

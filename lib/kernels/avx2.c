@@ -46,6 +46,7 @@ static size_t search_avx2(const ascc_coordinates *points, size_t begin, size_t e
     return count;
 }
 
+#define ASCC_USE_AVX2
 #define SEARCH search_avx2
 #define ASCC_VARIANT ascc_kernels_avx2
 #include "body.h"

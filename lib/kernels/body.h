@@ -8,6 +8,13 @@
 #include "vector.h"
 
 #define RESTRICT restrict
+#if defined(__clang__)
+#define UNROLL _Pragma("clang loop unroll_count(4)")
+#elif defined(__GNUC__)
+#define UNROLL _Pragma("GCC unroll 4")
+#else
+#define UNROLL
+#endif
 
 /* A variant may bring a search of its own. */
 #ifndef SEARCH
@@ -56,9 +63,8 @@ static void map_volume(float *RESTRICT px, float *RESTRICT py, float *RESTRICT p
         const float az = fabsf(z);
         const int cap = 1.25f * (z * z) > h2;
         const int center = n2 < 1e-12f;
-        const float s_cap = sqrtf(3.0f * n / (center ? 1.0f : n + az));
-        const float s_side = n / (cap | center ? 1.0f : sqrtf(h2));
-        const float s = center ? 0.0f : cap ? s_cap : s_side;
+        const float above = cap ? 3.0f * n : n2, below = cap ? n + az : h2;
+        const float s = center ? 0.0f : sqrtf(above / (center ? 1.0f : below));
         z = center ? 0.0f : cap ? copysignf(n, z) : 1.5f * z;
         x *= s;
         y *= s;
@@ -131,53 +137,33 @@ typedef struct corners {
     float weight[8][LANES];
 } corners;
 
-/* Lower cell and fraction along an axis of `size` cells (align corners). At the upper end the last
- * cell has the fraction 1. */
-static inline void axis_cells(float p, int32_t size, int32_t *low, float *fraction)
+/* Lower cells and fractions of eight neighbours along an axis of `size` cells (align corners). At the
+ * upper end the last cell has the fraction 1. */
+static inline vector axis_cells(const float *p, int32_t size, vector *fraction)
 {
-    const float c = (p * 0.5f + 0.5f) * (float)(size - 1);
-    const int32_t last = size > 1 ? size - 2 : 0;
-    int32_t i = (int32_t)c;
-    i = i > 0 ? i : 0;
-    i = i < last ? i : last;
-    float t = c - (float)i;
-    t = t > 0.0f ? t : 0.0f;
-    t = t < 1.0f ? t : 1.0f;
-    *low = i;
-    *fraction = t;
+    const vector zero = fill(0.0f), half = fill(0.5f);
+    const vector c = times(add(times(load(p), half), half), fill((float)(size - 1)));
+    const vector low = whole(smaller(larger(c, zero), fill(size > 1 ? (float)(size - 2) : 0.0f)));
+    *fraction = smaller(larger(minus(c, low), zero), fill(1.0f));
+    return low;
 }
 
-/* Corners of neighbours [0, n), n <= 8; the rest of the lanes repeats lane 0. */
-static inline void find_corners(const float *RESTRICT x, const float *RESTRICT y,
-                                const float *RESTRICT z, const float *RESTRICT window, size_t n,
-                                const int32_t cells[3], corners *RESTRICT out)
+/* Corners of eight neighbours. */
+static inline void find_corners(const float *x, const float *y, const float *z, const float *window,
+                                const int32_t cells[3], corners *out)
 {
-    float px[LANES], py[LANES], pz[LANES], scale[LANES];
-    for (size_t i = 0; i < LANES; i++) {
-        const size_t k = i < n ? i : 0;
-        px[i] = x[k];
-        py[i] = y[k];
-        pz[i] = z[k];
-        scale[i] = window ? window[k] : 1.0f;
-    }
-    const int32_t w = cells[0], wh = w * cells[1];
-    for (size_t i = 0; i < LANES; i++) {
-        int32_t ix, iy, iz;
-        float tx, ty, tz;
-        axis_cells(px[i], cells[0], &ix, &tx);
-        axis_cells(py[i], cells[1], &iy, &ty);
-        axis_cells(pz[i], cells[2], &iz, &tz);
-        const float sx = 1.0f - tx, sy = 1.0f - ty;
-        const float z0 = (1.0f - tz) * scale[i], z1 = tz * scale[i];
-        out->cell[i] = iz * wh + iy * w + ix;
-        out->weight[0][i] = sx * sy * z0;
-        out->weight[1][i] = tx * sy * z0;
-        out->weight[2][i] = sx * ty * z0;
-        out->weight[3][i] = tx * ty * z0;
-        out->weight[4][i] = sx * sy * z1;
-        out->weight[5][i] = tx * sy * z1;
-        out->weight[6][i] = sx * ty * z1;
-        out->weight[7][i] = tx * ty * z1;
+    const vector one = fill(1.0f), scale = window ? load(window) : one;
+    vector tx, ty, tz;
+    const vector ix = axis_cells(x, cells[0], &tx), iy = axis_cells(y, cells[1], &ty);
+    const vector iz = axis_cells(z, cells[2], &tz);
+    const vector row = fill((float)cells[0]);
+    store_whole(out->cell, add(times(add(times(iz, fill((float)cells[1])), iy), row), ix));
+    const vector sx = minus(one, tx), sy = minus(one, ty);
+    const vector z0 = times(minus(one, tz), scale), z1 = times(tz, scale);
+    const vector plane[4] = {times(sx, sy), times(tx, sy), times(sx, ty), times(tx, ty)};
+    for (size_t i = 0; i < 4; i++) {
+        store(out->weight[i], times(plane[i], z0));
+        store(out->weight[4 + i], times(plane[i], z1));
     }
 }
 
@@ -191,19 +177,22 @@ static inline int corner_offsets(const int32_t cells[3], size_t offset[8])
     return cells[2] > 1 ? 8 : 4;
 }
 
-/* column[offset + j] += weight * f[j] for `vectors` vectors: the inner loop of gather. */
+/* Adds one neighbour's features to the cells around it: cells that are next to each other along x lie
+ * next to each other in the column, so there are 4 pairs of them, or 2 in a flat kernel. */
 #define SPREAD(name, vectors)                                                                      \
-    static inline void name(const float *RESTRICT f, const corners *at, size_t lane, size_t a,     \
-                            const size_t offset[8], int count, float *RESTRICT column)             \
+    static inline void name(const float *RESTRICT f, const float *RESTRICT weight, size_t x,       \
+                            size_t y, size_t z, int planes, float *RESTRICT cell)                  \
     {                                                                                              \
         vector v[vectors];                                                                         \
         for (size_t j = 0; j < vectors; j++)                                                       \
             v[j] = load(f + j * LANES);                                                            \
-        for (int c = 0; c < count; c++) {                                                          \
-            const vector weight = fill(at->weight[c][lane]);                                       \
-            float *RESTRICT cell = column + ((size_t)at->cell[lane] + offset[c]) * a;              \
-            for (size_t j = 0; j < vectors; j++)                                                   \
-                store(cell + j * LANES, fused(weight, v[j], load(cell + j * LANES)));              \
+        for (int plane = 0; plane < planes; plane++, cell += z, weight += 4 * LANES) {             \
+            float *RESTRICT at[4] = {cell, cell + x, cell + y, cell + y + x};                      \
+            for (size_t c = 0; c < 4; c++) {                                                       \
+                const vector w = fill(weight[c * LANES]);                                          \
+                for (size_t j = 0; j < vectors; j++)                                               \
+                    store(at[c] + j * LANES, fused(w, v[j], load(at[c] + j * LANES)));             \
+            }                                                                                      \
         }                                                                                          \
     }
 SPREAD(spread_1, 1)
@@ -214,25 +203,27 @@ SPREAD(spread_4, 4)
 static void gather(const ascc_pairs *pairs, const float *window, const uint32_t *neighbor, size_t k,
                    const float *feature, size_t a, const int32_t cells[3], float *column)
 {
-    size_t offset[8];
-    const int count = corner_offsets(cells, offset);
+    const size_t x = cells[0] > 1 ? a : 0, y = cells[1] > 1 ? (size_t)cells[0] * a : 0;
+    const size_t z = cells[2] > 1 ? (size_t)cells[0] * (size_t)cells[1] * a : 0;
+    const int planes = cells[2] > 1 ? 2 : 1;
     memset(column, 0, (size_t)cells[0] * (size_t)cells[1] * (size_t)cells[2] * a * sizeof *column);
     for (size_t i = 0; i < k; i += LANES) {
         const size_t n = k - i < LANES ? k - i : LANES;
         corners at;
-        find_corners(pairs->x + i, pairs->y + i, pairs->z + i, window ? window + i : NULL, n, cells,
+        find_corners(pairs->x + i, pairs->y + i, pairs->z + i, window ? window + i : NULL, cells,
                      &at);
         for (size_t l = 0; l < n; l++) {
-            const float *f = feature + (size_t)neighbor[i + l] * a;
+            const float *f = feature + (size_t)neighbor[i + l] * a, *w = at.weight[0] + l;
+            float *cell = column + (size_t)at.cell[l] * a;
             size_t j = 0;
             for (; j + 4 * LANES <= a; j += 4 * LANES)
-                spread_4(f + j, &at, l, a, offset, count, column + j);
+                spread_4(f + j, w, x, y, z, planes, cell + j);
             if (j + 3 * LANES <= a)
-                spread_3(f + j, &at, l, a, offset, count, column + j);
+                spread_3(f + j, w, x, y, z, planes, cell + j);
             else if (j + 2 * LANES <= a)
-                spread_2(f + j, &at, l, a, offset, count, column + j);
+                spread_2(f + j, w, x, y, z, planes, cell + j);
             else if (j < a)
-                spread_1(f + j, &at, l, a, offset, count, column + j);
+                spread_1(f + j, w, x, y, z, planes, cell + j);
         }
     }
 }
@@ -247,7 +238,8 @@ static void gather(const ascc_pairs *pairs, const float *window, const uint32_t 
         for (size_t r = 0; r < rows; r++)                                                          \
             for (size_t c = 0; c < vectors; c++)                                                   \
                 sum[r][c] = load(out + r * out_stride + c * LANES);                                \
-        for (size_t i = 0; i < a; i++) {                                                           \
+        UNROLL for (size_t i = 0; i < a; i++)                                                      \
+        {                                                                                          \
             vector w[vectors];                                                                     \
             for (size_t c = 0; c < vectors; c++)                                                   \
                 w[c] = load(weight + i * b + c * LANES);                                           \
@@ -268,10 +260,17 @@ TILE(tile_8_1, 8, 1)
 TILE(tile_4_1, 4, 1)
 TILE(tile_1_1, 1, 1)
 
-static void multiply(const float *in, size_t in_stride, size_t n, size_t a, const float *weight,
-                     size_t b, float *out, size_t out_stride)
+/* Inputs that are multiplied in one go, so that their weights and columns stay in the first cache. */
+#define DEPTH 128
+
+/* The sums of a stretch of inputs go on where those before it ended. */
+static void multiply_stretch(const float *in, size_t in_stride, size_t n, size_t a,
+                             const float *weight, size_t b, float *out, size_t out_stride)
 {
     size_t c = 0;
+#ifdef MULTIPLY_FIRST /* a variant may take the first columns with tiles of its own */
+    c = MULTIPLY_FIRST(in, in_stride, n, a, weight, b, out, out_stride);
+#endif
 #define ROWS(tile, rows)                                                                           \
     for (; r + rows <= n; r += rows)                                                               \
         tile(in + r * in_stride, in_stride, a, weight + c, b, out + r * out_stride + c, out_stride);
@@ -290,6 +289,15 @@ static void multiply(const float *in, size_t in_stride, size_t n, size_t a, cons
 #undef ROWS
 }
 
+static void multiply(const float *in, size_t in_stride, size_t n, size_t a, const float *weight,
+                     size_t b, float *out, size_t out_stride)
+{
+    for (size_t i = 0; i < a; i += DEPTH) {
+        const size_t depth = a - i < DEPTH ? a - i : DEPTH;
+        multiply_stretch(in + i, in_stride, n, depth, weight + i * b, b, out, out_stride);
+    }
+}
+
 static void pair_terms(const ascc_pairs *pairs, const float *window, const uint32_t *neighbor,
                        size_t k, const float *center, const float *feature, size_t a,
                        const int32_t cells[3], const float *weight, size_t b, float *out)
@@ -301,7 +309,7 @@ static void pair_terms(const ascc_pairs *pairs, const float *window, const uint3
     for (size_t i = 0; i < k; i += LANES) {
         const size_t n = k - i < LANES ? k - i : LANES;
         corners at;
-        find_corners(pairs->x + i, pairs->y + i, pairs->z + i, window ? window + i : NULL, n, cells,
+        find_corners(pairs->x + i, pairs->y + i, pairs->z + i, window ? window + i : NULL, cells,
                      &at);
         for (size_t l = 0; l < n; l++) {
             const float *f = feature + (size_t)neighbor[i + l] * a;

@@ -18,7 +18,8 @@ typedef struct ascc_coordinates {
 } ascc_coordinates;
 
 /* Geometry of neighbour pairs, one entry a pair: where the neighbour lies in the kernel's cube
- * [-1, 1]^3, and the value of each window there (by ascc_window; NULL = not wanted). */
+ * [-1, 1]^3, and the value of each window there (by ascc_window; NULL = not wanted). Every array can
+ * be read to the next multiple of 8 pairs; what lies there does not matter. */
 typedef struct ascc_pairs {
     float *x, *y, *z;
     float *window[3];

@@ -12,6 +12,15 @@ uint32_t ascc_kernels_available(void)
         __builtin_cpu_supports("bmi2"))
         cpu |= ASCC_CPU_AVX2;
 #endif
+#if defined(ASCC_HAVE_AVX512)
+    if ((cpu & ASCC_CPU_AVX2) && __builtin_cpu_supports("avx512f") &&
+        __builtin_cpu_supports("avx512bw") && __builtin_cpu_supports("avx512dq") &&
+        __builtin_cpu_supports("avx512vl"))
+        cpu |= ASCC_CPU_AVX512;
+#endif
+#if defined(ASCC_HAVE_NEON)
+    cpu |= ASCC_CPU_NEON; /* every aarch64 has it */
+#endif
     return cpu;
 }
 
@@ -22,5 +31,13 @@ void ascc_kernels_select(ascc_kernels *kernels, uint32_t cpu)
 #if defined(ASCC_HAVE_AVX2)
     if (cpu & ASCC_CPU_AVX2)
         ascc_kernels_avx2(kernels);
+#endif
+#if defined(ASCC_HAVE_AVX512)
+    if (cpu & ASCC_CPU_AVX512)
+        ascc_kernels_avx512(kernels);
+#endif
+#if defined(ASCC_HAVE_NEON)
+    if (cpu & ASCC_CPU_NEON)
+        ascc_kernels_neon(kernels);
 #endif
 }

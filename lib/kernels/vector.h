@@ -1,7 +1,9 @@
 /* Eight floats as one value, for each instruction set: what body.h is written in.
  * SPDX-License-Identifier: MIT
  *
- * Every operation is elementwise and correctly rounded, so the bits are those of eight scalars.
+ * Every operation is elementwise and correctly rounded, so the bits are those of eight scalars. The
+ * file of a variant picks its branch, whatever the compiler's flags allow, with ASCC_USE_AVX2 (AVX2 and
+ * FMA) or ASCC_USE_NEON; without either it is plain C.
  */
 #ifndef ASCC_VECTOR_H
 #define ASCC_VECTOR_H
@@ -12,7 +14,7 @@
 
 #define LANES 8
 
-#if defined(__AVX2__) && defined(__FMA__)
+#if defined(ASCC_USE_AVX2)
 #include <immintrin.h>
 
 typedef __m256 vector;
@@ -48,7 +50,34 @@ static inline vector fused(vector a, vector b, vector c)
     return _mm256_fmadd_ps(a, b, c);
 }
 
-#elif defined(__aarch64__)
+static inline vector minus(vector a, vector b)
+{
+    return _mm256_sub_ps(a, b);
+}
+
+/* a > b ? a : b, so b where a is no number; and a < b ? a : b. */
+static inline vector larger(vector a, vector b)
+{
+    return _mm256_max_ps(a, b);
+}
+
+static inline vector smaller(vector a, vector b)
+{
+    return _mm256_min_ps(a, b);
+}
+
+/* The whole part of 0 <= a < 2^24, and that as integers. */
+static inline vector whole(vector a)
+{
+    return _mm256_round_ps(a, _MM_FROUND_TO_ZERO | _MM_FROUND_NO_EXC);
+}
+
+static inline void store_whole(int32_t *p, vector a)
+{
+    _mm256_storeu_si256((__m256i *)p, _mm256_cvttps_epi32(a));
+}
+
+#elif defined(ASCC_USE_NEON)
 #include <arm_neon.h>
 
 typedef struct vector {
@@ -86,7 +115,36 @@ static inline vector fused(vector a, vector b, vector c)
     return (vector){vfmaq_f32(c.low, a.low, b.low), vfmaq_f32(c.high, a.high, b.high)};
 }
 
+static inline vector minus(vector a, vector b)
+{
+    return (vector){vsubq_f32(a.low, b.low), vsubq_f32(a.high, b.high)};
+}
+
+static inline vector larger(vector a, vector b)
+{
+    return (vector){vbslq_f32(vcgtq_f32(a.low, b.low), a.low, b.low),
+                    vbslq_f32(vcgtq_f32(a.high, b.high), a.high, b.high)};
+}
+
+static inline vector smaller(vector a, vector b)
+{
+    return (vector){vbslq_f32(vcltq_f32(a.low, b.low), a.low, b.low),
+                    vbslq_f32(vcltq_f32(a.high, b.high), a.high, b.high)};
+}
+
+static inline vector whole(vector a)
+{
+    return (vector){vrndq_f32(a.low), vrndq_f32(a.high)};
+}
+
+static inline void store_whole(int32_t *p, vector a)
+{
+    vst1q_s32(p, vcvtq_s32_f32(a.low));
+    vst1q_s32(p + 4, vcvtq_s32_f32(a.high));
+}
+
 #else
+#include "fused.h"
 
 typedef struct vector {
     float lane[LANES];
@@ -128,9 +186,46 @@ static inline vector times(vector a, vector b)
 
 static inline vector fused(vector a, vector b, vector c)
 {
+#if defined(__GNUC__) && !defined(__clang__)
+#pragma GCC unroll 1
+#endif
     for (int i = 0; i < LANES; i++)
-        c.lane[i] = fmaf(a.lane[i], b.lane[i], c.lane[i]);
+        c.lane[i] = fused_once(a.lane[i], b.lane[i], c.lane[i]);
     return c;
+}
+
+static inline vector minus(vector a, vector b)
+{
+    for (int i = 0; i < LANES; i++)
+        a.lane[i] -= b.lane[i];
+    return a;
+}
+
+static inline vector larger(vector a, vector b)
+{
+    for (int i = 0; i < LANES; i++)
+        a.lane[i] = a.lane[i] > b.lane[i] ? a.lane[i] : b.lane[i];
+    return a;
+}
+
+static inline vector smaller(vector a, vector b)
+{
+    for (int i = 0; i < LANES; i++)
+        a.lane[i] = a.lane[i] < b.lane[i] ? a.lane[i] : b.lane[i];
+    return a;
+}
+
+static inline vector whole(vector a)
+{
+    for (int i = 0; i < LANES; i++)
+        a.lane[i] = (float)(int32_t)a.lane[i];
+    return a;
+}
+
+static inline void store_whole(int32_t *p, vector a)
+{
+    for (int i = 0; i < LANES; i++)
+        p[i] = (int32_t)a.lane[i];
 }
 
 #endif

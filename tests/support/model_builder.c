@@ -274,7 +274,7 @@ static void add_trunk_layer(random_network *n, int layer)
     const int last = layer == n->o.trunk_layers, c = n->o.channels;
     const int sources = layer == 1 ? 1 : n->o.levels;
     for (int d = 0; d < (last ? 1 : n->o.levels); d++) {
-        char points[16], name[32], source[32];
+        char points[16], name[48], source[48];
         snprintf(points, sizeof points, d ? "level%d" : n->o.fluid_only ? "fluid" : "all", d);
         const int width = last && n->o.plain ? n->o.dimension : c;
         model_text_add(&n->text,

@@ -1,0 +1,176 @@
+/* `ascc eval`: a method against true sequences.
+ * SPDX-License-Identifier: MIT
+ *
+ * The same input gives the same numbers, for any number of threads.
+ */
+#include <errno.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "commands.h"
+#include "evaluate.h"
+
+enum { MOST_SEQUENCES = 256, COLUMNS = 5 };
+
+typedef struct options {
+    ascc_evaluate_options measure;
+    const char *method, *json, *csv;
+    const char *sequence[MOST_SEQUENCES];
+    size_t sequence_count;
+    int32_t threads;
+    bool quiet;
+} options;
+
+/* The method that a word means, and the settings in it; NULL if there is none. */
+static const ascc_method *find_method(const char *word, const char **settings)
+{
+    for (size_t k = 0; ascc_methods[k]; k++) {
+        const size_t length = strlen(ascc_methods[k]->prefix);
+        *settings = word + length;
+        if (strncmp(word, ascc_methods[k]->prefix, length) == 0)
+            return ascc_methods[k];
+    }
+    return NULL;
+}
+
+static int usage(FILE *file)
+{
+    fputs("ascc eval METHOD SEQUENCE... [options]\n"
+          "  Runs METHOD on true sequences (docs/measures.md says what is measured).\n\n"
+          "METHOD\n",
+          file);
+    for (size_t k = 0; ascc_methods[k]; k++)
+        fprintf(file, "  %s\n", ascc_methods[k]->help);
+    fputs("\noptions\n"
+          "  --threads N        threads to use (1); numbers do not depend on it\n"
+          "  --json FILE        figures as JSON\n"
+          "  --csv FILE         figures as CSV, one a line\n"
+          "  --frames A:B:STEP  start frames of one- and two-frame errors, B not included\n"
+          "  --velocity KIND    stored or difference: velocities these start with (both)\n"
+          "  --transport        earth mover's distances of the last frame too: minutes\n"
+          "  --no-rollout       one- and two-frame errors only\n"
+          "  --quiet            no table\n",
+          file);
+    return file == stdout ? 0 : 2;
+}
+
+static bool read_long(const char *text, long least, long *value)
+{
+    char *end;
+    errno = 0;
+    *value = strtol(text, &end, 10);
+    return end != text && !*end && !errno && *value >= least;
+}
+
+static bool read_frames(const char *text, options *o)
+{
+    char end;
+    o->measure.has_frames = true;
+    return sscanf(text, "%ld:%ld:%ld%c", &o->measure.first, &o->measure.end, &o->measure.step,
+                  &end) == 3 &&
+           o->measure.first >= 0 && o->measure.step > 0;
+}
+
+/* An option with a value; false if it is none, or its value is not understood. */
+static bool read_option(const char *name, const char *value, options *o)
+{
+    long number;
+    if (strcmp(name, "--threads") == 0 && read_long(value, 1, &number) && number <= 1024)
+        o->threads = (int32_t)number;
+    else if (strcmp(name, "--json") == 0)
+        o->json = value;
+    else if (strcmp(name, "--csv") == 0)
+        o->csv = value;
+    else if (strcmp(name, "--velocity") == 0 && strcmp(value, "stored") == 0)
+        o->measure.velocity = ASCC_VELOCITY_STORED;
+    else if (strcmp(name, "--velocity") == 0 && strcmp(value, "difference") == 0)
+        o->measure.velocity = ASCC_VELOCITY_DIFFERENCE;
+    else
+        return strcmp(name, "--frames") == 0 && read_frames(value, o);
+    return true;
+}
+
+static bool read_arguments(int argc, char **argv, options *o)
+{
+    for (int i = 0; i < argc; i++) {
+        if (strcmp(argv[i], "--transport") == 0)
+            o->measure.transport = true;
+        else if (strcmp(argv[i], "--quiet") == 0)
+            o->quiet = true;
+        else if (strcmp(argv[i], "--no-rollout") == 0)
+            o->measure.no_rollout = true;
+        else if (strncmp(argv[i], "--", 2) == 0) {
+            if (i + 1 == argc || !read_option(argv[i], argv[i + 1], o)) {
+                fprintf(stderr, "ascc eval: %s: unknown, or not with this value\n", argv[i]);
+                return false;
+            }
+            i++;
+        } else if (!o->method)
+            o->method = argv[i];
+        else if (o->sequence_count < MOST_SEQUENCES)
+            o->sequence[o->sequence_count++] = argv[i];
+    }
+    return o->method && o->sequence_count;
+}
+
+/* "some/folder/name.safetensors" is called "folder/name". */
+static void name_sequence(const char *path, char *name, size_t capacity)
+{
+    const char *start = path + strlen(path);
+    for (int slashes = 0; start > path; start--)
+        if (start[-1] == '/' && ++slashes == 2)
+            break;
+    snprintf(name, capacity, "%s", start);
+    char *end = strrchr(name, '.');
+    if (end && strcmp(end, ".safetensors") == 0)
+        *end = 0;
+}
+
+static bool write_reports(const options *o, const ascc_report_run *runs)
+{
+    const size_t n = o->sequence_count;
+    if (!o->quiet)
+        ascc_report_table(stdout, o->method, runs, n, COLUMNS);
+    if (o->json && !ascc_report_json(o->json, o->method, runs, n)) {
+        fprintf(stderr, "ascc eval: cannot write %s\n", o->json);
+        return false;
+    }
+    if (o->csv && !ascc_report_csv(o->csv, o->method, runs, n)) {
+        fprintf(stderr, "ascc eval: cannot write %s\n", o->csv);
+        return false;
+    }
+    return true;
+}
+
+int ascc_command_eval(int argc, char **argv)
+{
+    options o = {.threads = 1, .measure.velocity = -1};
+    if (argc > 0 && (strcmp(argv[0], "--help") == 0 || strcmp(argv[0], "-h") == 0))
+        return usage(stdout);
+    if (!read_arguments(argc, argv, &o))
+        return usage(stderr);
+    const char *settings;
+    const ascc_method *method = find_method(o.method, &settings);
+    if (!method) {
+        fprintf(stderr, "ascc eval: %s: no such method\n", o.method);
+        return 2;
+    }
+    ascc_report_run *runs = calloc(o.sequence_count, sizeof *runs);
+    bool fine = runs != NULL;
+    for (size_t k = 0; k < o.sequence_count && fine; k++) {
+        ascc_truth t;
+        ascc_method_error error = {""};
+        name_sequence(o.sequence[k], runs[k].sequence, sizeof runs[k].sequence);
+        fine = ascc_truth_load(o.sequence[k], o.threads, &t, &error);
+        if (fine) {
+            fine = ascc_evaluate(&o.measure, method, settings, &t, &runs[k], &error);
+            ascc_truth_free(&t);
+        }
+        if (!fine)
+            fprintf(stderr, "ascc eval: %s: %s\n", o.sequence[k], error.text);
+    }
+    fine = fine && write_reports(&o, runs);
+    free(runs);
+    return fine ? 0 : 1;
+}

@@ -1,0 +1,39 @@
+/* Measuring a method on a sequence: what `ascc eval` and the charts have in common.
+ * SPDX-License-Identifier: MIT */
+#ifndef ASCC_EVALUATE_H
+#define ASCC_EVALUATE_H
+
+#include "method.h"
+#include "report.h"
+
+/** A sequence in double, and the scene that a method sees. */
+typedef struct ascc_truth {
+    ascc_method_scene scene;
+    size_t frames, velocity_frames;
+    double *position, *velocity; /* [frames], [velocity_frames][fluid_count][dimension] */
+    double *wall, *normal;
+} ascc_truth;
+
+/** Reads a sequence; `threads` is what methods and measures may use. */
+bool ascc_truth_load(const char *path, int32_t threads, ascc_truth *truth,
+                     ascc_method_error *error);
+void ascc_truth_free(ascc_truth *truth);
+
+/** What to measure; zero, but velocity = -1, is everything but transport, as docs/measures.md says. */
+typedef struct ascc_evaluate_options {
+    bool has_frames; /* start frames first, first + step, ... below end (< 0: the last) */
+    bool transport;  /* earth mover's distances of the last frame */
+    bool no_rollout;
+    long first, end, step;
+    int velocity; /* an ascc_velocity_kind; -1 = both, as far as stored */
+} ascc_evaluate_options;
+
+/**
+ * Runs and measures; run->sequence is set, figures are added. False only if the method cannot be opened
+ * or there is no memory: a method that stops on the way is a result, and run->note says why.
+ */
+bool ascc_evaluate(const ascc_evaluate_options *options, const ascc_method *method,
+                   const char *settings, const ascc_truth *truth, ascc_report_run *run,
+                   ascc_method_error *error);
+
+#endif

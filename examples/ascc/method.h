@@ -1,0 +1,62 @@
+/* What `ascc eval` and the charts run: any way to advance a fluid by one frame.
+ * SPDX-License-Identifier: MIT
+ *
+ * A new method is one ascc_method in a file of its own, a declaration below, and a line in methods.c. Positions and velocities are packed double[fluid_count][dimension], SI units.
+ */
+#ifndef ASCC_METHOD_H
+#define ASCC_METHOD_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+/** What a scene's velocities are: it decides how far a particle flies freely in one frame. */
+typedef enum ascc_velocity_kind {
+    ASCC_VELOCITY_STORED = 0,     /* at the frame's instant: x' = x + dt v + dt^2 g / 2 */
+    ASCC_VELOCITY_DIFFERENCE = 1, /* (x_t - x_(t-1)) / dt:   x' = x + dt (v + dt g) */
+} ascc_velocity_kind;
+
+/** What a method is opened with; lives as long as the method's state does. */
+typedef struct ascc_method_scene {
+    int32_t dimension;
+    int32_t threads;
+    double time_step;    /* s from frame to frame */
+    double spacing;      /* m */
+    double mass;         /* kg, of a particle */
+    double rest_density; /* kg/m^3 */
+    double gravity[3];
+    size_t fluid_count, wall_count;
+    const double *wall, *normal; /* [wall_count][dimension] */
+    size_t first_layer;          /* wall points that touch the fluid: the first so many */
+} ascc_method_scene;
+
+/** Why a method failed. */
+typedef struct ascc_method_error {
+    char text[256];
+} ascc_method_error;
+
+typedef struct ascc_method {
+    const char *prefix; /* "sph:"; what follows it is the settings. "" takes all that is left */
+    const char *help;   /* one line */
+
+    /* Makes a state for the scene, without fluid yet. */
+    bool (*open)(const char *settings, const ascc_method_scene *scene, void **state,
+                 ascc_method_error *error);
+    /* Places the fluid; may be called many times, and forgets what was before. */
+    bool (*set)(void *state, const double *position, const double *velocity,
+                ascc_velocity_kind kind, ascc_method_error *error);
+    /* One frame; false if the method cannot go on (the state is then as good as closed). */
+    bool (*advance)(void *state, ascc_method_error *error);
+    void (*read)(const void *state, double *position, double *velocity);
+    /* Momentum that gravity gave to the fluid and that the fluid gave to walls in the last frame, kg
+     * m/s; NULL if the method cannot tell. */
+    void (*impulses)(const void *state, double external[3], double wall[3]);
+    void (*close)(void *state);
+} ascc_method;
+
+/** All methods, NULL at the end: a word means the first whose prefix it begins with. */
+extern const ascc_method *const ascc_methods[];
+
+extern const ascc_method ascc_method_ballistic, ascc_method_model;
+
+#endif

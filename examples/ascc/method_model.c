@@ -1,0 +1,155 @@
+/* A model file as a method, run by libascc.
+ * SPDX-License-Identifier: MIT */
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+
+#include <ascc/ascc.h>
+
+#include "method.h"
+
+typedef struct learned {
+    const ascc_method_scene *scene;
+    ascc_context *context;
+    ascc_model *model;
+    ascc_step *step;
+    ascc_particles *particles;
+    double time_step, spacing; /* of the model */
+} learned;
+
+static bool context_failed(const learned *m, const char *what, ascc_method_error *error)
+{
+    char line[256] = "";
+    if (m->context)
+        (void)ascc_context_message(m->context, line, sizeof line);
+    snprintf(error->text, sizeof error->text, "%s: %.220s", what, line);
+    return false;
+}
+
+static void learned_close(void *state)
+{
+    learned *m = state;
+    ascc_particles_destroy(&m->particles);
+    ascc_step_destroy(&m->step);
+    ascc_model_destroy(&m->model);
+    ascc_context_destroy(&m->context);
+    free(m);
+}
+
+static bool learned_load(learned *m, const char *path, ascc_method_error *error)
+{
+    const ascc_context_options options = {.size = sizeof options,
+                                          .thread_count = m->scene->threads};
+    ascc_model_info info = {.size = sizeof info};
+    if (ascc_context_create(&options, &m->context) != ASCC_OK ||
+        ascc_model_load(m->context, path, &m->model) != ASCC_OK)
+        return context_failed(m, "model", error);
+    (void)ascc_model_get_info(m->model, &info);
+    if (info.dimension != m->scene->dimension) {
+        snprintf(error->text, sizeof error->text, "a model for %dD, a scene in %dD",
+                 (int)info.dimension, (int)m->scene->dimension);
+        return false;
+    }
+    m->time_step = info.time_step;
+    m->spacing = info.particle_spacing;
+    return true;
+}
+
+static bool learned_open(const char *settings, const ascc_method_scene *scene, void **state,
+                         ascc_method_error *error)
+{
+    learned *m = calloc(1, sizeof *m);
+    if (!m) {
+        snprintf(error->text, sizeof error->text, "no memory");
+        return false;
+    }
+    m->scene = scene;
+    if (!learned_load(m, settings, error)) {
+        learned_close(m);
+        return false;
+    }
+    if (fabs(scene->spacing - m->spacing) > 0.01 * m->spacing)
+        fprintf(stderr, "ascc: a scene with spacing %g m, a model trained with %g m\n",
+                scene->spacing, m->spacing);
+    *state = m;
+    return true;
+}
+
+static ascc_status learned_fill(learned *m, const double *position, const double *velocity)
+{
+    const ascc_const_array x = {.data = position, .scalar = ASCC_DOUBLE};
+    const ascc_const_array v = {.data = velocity, .scalar = ASCC_DOUBLE};
+    const ascc_const_array wall = {.data = m->scene->wall, .scalar = ASCC_DOUBLE};
+    const ascc_const_array normal = {.data = m->scene->normal, .scalar = ASCC_DOUBLE};
+    const ascc_status status =
+        ascc_particles_add_fluid(m->particles, m->scene->fluid_count, &x, &v, NULL, NULL);
+    if (status != ASCC_OK || !m->scene->wall_count)
+        return status;
+    return ascc_particles_add_boundary(m->particles, m->scene->wall_count, &wall, &normal, 0, NULL);
+}
+
+/* Everything anew, so that nothing of an earlier start can reach this one. */
+static bool learned_set(void *state, const double *position, const double *velocity,
+                        ascc_velocity_kind kind, ascc_method_error *error)
+{
+    learned *m = state;
+    const double dt = m->scene->time_step;
+    const ascc_particles_options particles = {.size = sizeof particles,
+                                              .dimension = m->scene->dimension,
+                                              .spacing = m->spacing,
+                                              .mass = m->scene->mass};
+    const ascc_step_options step = {.size = sizeof step,
+                                    .time_step = fabs(dt - m->time_step) > 1e-6 * dt ? dt : 0.0};
+    (void)kind;
+    ascc_particles_destroy(&m->particles);
+    if (!m->step && ascc_step_create(m->context, m->model, &step, &m->step) != ASCC_OK)
+        return context_failed(m, "step", error);
+    if (ascc_particles_create(m->context, &particles, &m->particles) != ASCC_OK)
+        return context_failed(m, "particles", error);
+    if (learned_fill(m, position, velocity) == ASCC_OK)
+        return true;
+    snprintf(error->text, sizeof error->text, "%s", ascc_particles_message(m->particles));
+    return false;
+}
+
+static bool learned_advance(void *state, ascc_method_error *error)
+{
+    learned *m = state;
+    const ascc_forces forces = {.size = sizeof forces, .gravity = m->scene->gravity};
+    if (ascc_step_run(m->step, m->particles, &forces, 1) == ASCC_OK)
+        return true;
+    snprintf(error->text, sizeof error->text, "%s", ascc_step_message(m->step));
+    return false;
+}
+
+static void learned_read(const void *state, double *position, double *velocity)
+{
+    const learned *m = state;
+    const ascc_array x = {.data = position, .scalar = ASCC_DOUBLE};
+    const ascc_array v = {.data = velocity, .scalar = ASCC_DOUBLE};
+    (void)ascc_particles_get(m->particles, ASCC_FLUID, ASCC_POSITION, 0, m->scene->fluid_count, &x);
+    (void)ascc_particles_get(m->particles, ASCC_FLUID, ASCC_VELOCITY, 0, m->scene->fluid_count, &v);
+}
+
+static void learned_impulses(const void *state, double external[3], double wall[3])
+{
+    const learned *m = state;
+    const double quantum = ascc_particles_momentum_quantum(m->particles);
+    ascc_step_statistics statistics = {.size = sizeof statistics};
+    (void)ascc_step_get_statistics(m->step, &statistics);
+    for (int c = 0; c < 3; c++) {
+        external[c] = (double)statistics.external_impulse[c] * quantum;
+        wall[c] = (double)statistics.wall_impulse[c] * quantum;
+    }
+}
+
+const ascc_method ascc_method_model = {
+    .prefix = "",
+    .help = "FILE           a model file, run by libascc",
+    .open = learned_open,
+    .set = learned_set,
+    .advance = learned_advance,
+    .read = learned_read,
+    .impulses = learned_impulses,
+    .close = learned_close,
+};

@@ -1,0 +1,155 @@
+#!/bin/sh
+# The ascc program from outside: arguments, files, pictures, interruption; prints TAP.
+# $1: a build folder. SPDX-License-Identifier: MIT
+cd "$(dirname "$0")/.." || exit 1
+ascc=$(cd "${1:-build}" && pwd)/examples/ascc || exit 1
+number=0
+failed=0
+folder=$(mktemp -d) || exit 1
+trap 'rm -rf "$folder"' EXIT
+cd "$folder" || exit 1
+
+report() {
+    number=$((number + 1))
+    if [ "$1" -eq 0 ]; then
+        echo "ok $number - $2"
+    else
+        echo "not ok $number - $2"
+        [ -f out ] && sed 's/^/# /' out err
+        failed=1
+    fi
+}
+
+run() { "$ascc" "$@" >out 2>err; }
+
+# refuses STATUS TEXT ARGUMENTS...: ends with that status and one line with the text on stderr.
+refuses() {
+    wanted=$1
+    text=$2
+    shift 2
+    run "$@"
+    status=$?
+    [ $status -eq "$wanted" ] && grep -qF -e "$text" err && [ ! -s out ]
+    report $? "ascc $* is refused: $text"
+}
+
+# holds NAME COMMAND...: passes when the command does.
+holds() {
+    name=$1
+    shift
+    "$@" >/dev/null 2>&1
+    report $? "$name"
+}
+
+words='sim demo dam-break-2d --size 6'
+# shellcheck disable=SC2086
+{
+    refuses 2 "usage: ascc COMMAND"
+    refuses 2 "'swim' is no command" swim
+    refuses 2 "MODEL and SCENE are wanted" sim
+    refuses 2 "MODEL and SCENE are wanted" sim demo -n 3
+    refuses 2 "-n STEPS is wanted" $words
+    refuses 2 "value is missing behind: -n" $words -n
+    refuses 2 "-n 0: a whole number" $words -n 0
+    refuses 2 "-n 3x: a whole number" $words -n 3x
+    refuses 2 "-n 99999999999999999999: a whole number" $words -n 99999999999999999999
+    refuses 2 "--every 0: a whole number" $words -n 1 --every 0
+    refuses 2 "--threads 1025: a whole number" $words -n 1 --threads 1025
+    refuses 2 "--size 3: a whole number" sim demo dam-break-2d -n 1 --size 3
+    refuses 2 "--dt -1: a number" $words -n 1 --dt -1
+    refuses 2 "--dt nan: a number" $words -n 1 --dt nan
+    refuses 2 "--spacing 0: a number" $words -n 1 --spacing 0
+    refuses 2 "--gravity 1: two or three" $words -n 1 --gravity 1
+    refuses 2 "--gravity 1,2,3,4: two or three" $words -n 1 --gravity 1,2,3,4
+    refuses 2 "--gravity 1,inf: two or three" $words -n 1 --gravity 1,inf
+    refuses 1 "--gravity has 3 numbers, dam-break-2d 2 dimensions" $words -n 1 --gravity 0,0,0
+    refuses 2 "--velocity takes stored or difference: fast" $words -n 1 --velocity fast
+    refuses 1 "--velocity difference takes two frames" $words -n 1 --velocity difference
+    refuses 2 "unknown option: --what" $words -n 1 --what 3
+    refuses 2 "one argument too many: more" $words more -n 1
+    refuses 1 "lake: neither a file nor a scene's name" sim demo lake-2d -n 1
+    refuses 1 "lake: No such file" sim demo lake -n 1
+    refuses 1 "cannot open 'none'" sim none dam-break-2d -n 1
+    refuses 1 "/nowhere/o: cannot be written: No such file" $words -n 1 -o /nowhere/o
+    refuses 1 "/nowhere/f: No such file" $words -n 1 --frames /nowhere/f
+    refuses 1 "/nowhere/p: No such file" $words -n 1 --ply /nowhere/p
+    refuses 1 "/dev/null/f" $words -n 1 --frames /dev/null/f
+    refuses 2 "usage: ascc info FILE" info
+    refuses 1 "No such file" info none
+    refuses 1 "is no regular file" info .
+    printf 'not a model' >text
+    refuses 1 "neither a model nor a sequence" info text
+    refuses 1 "longer than the file" sim demo text -n 1
+}
+
+for option in help --help version --version 'sim --help' 'info --help'; do
+    # shellcheck disable=SC2086
+    holds "ascc $option says something on stdout" sh -c '"$0" $1 | grep -q ascc' "$ascc" "$option"
+done
+
+run sim demo dam-break-2d --size 8 -n 20 --every 10 -o a.safetensors --frames png --ply ply
+report $? 'the demonstration model runs in 2D'
+holds 'the table has particles, phases and energy' sh -c '
+    grep -q "^particles  *32 fluid" out && grep -q "^  last layer .* ms a step" out &&
+        grep -q "^energy " out'
+holds 'the momentum error is exactly zero' grep -q '^momentum error  *0  (0 0 0 quanta' out
+holds 'and says why angular momentum is not measured' grep -q '^angular mom. error  *not measured' out
+holds 'nothing but the table is printed when stderr is no terminal' [ ! -s err ]
+holds 'the sequence is described' sh -c '
+    "$0" info a.safetensors | grep -q "frames  *3, .* s apart"' "$ascc"
+holds 'no temporary file is left' sh -c '[ -z "$(ls | grep part)" ]'
+holds 'there is a picture and a point cloud for each frame' sh -c '
+    [ "$(ls png)" = "frame_00000.png
+frame_00010.png
+frame_00020.png" ] && [ "$(ls ply | wc -l)" -eq 3 ]'
+# The signature, and the end chunk: IEND with its checksum.
+holds 'pictures are whole PNG files' sh -c '
+    for f in png/*; do
+        [ "$(head -c 8 $f | od -An -tx1 | tr -d " ")" = 89504e470d0a1a0a ] &&
+            [ "$(tail -c 8 $f | od -An -tx1 | tr -d " ")" = 49454e44ae426082 ] || exit 1
+    done'
+holds 'point clouds have 28 bytes a particle behind their header' sh -c '
+    for f in ply/*; do
+        header=$(sed "/^end_header/q" $f | wc -c)
+        head -n 3 $f | tail -n 1 | grep -q "element vertex 32" &&
+            [ $(($(wc -c <$f) - header)) -eq $((32 * 28)) ] || exit 1
+    done'
+
+run sim demo dam-break-2d --size 8 -n 20 --every 10 -o b.safetensors --threads 3
+holds 'three threads write the same bytes as one' cmp a.safetensors b.safetensors
+run sim demo a.safetensors -n 10 -o c.safetensors
+report $? 'a run starts from a sequence file'
+run sim demo a.safetensors -n 10 --velocity difference
+report $? 'a run starts from differences of frames'
+run sim demo droplets-3d --size 6 -n 20
+holds 'droplets conserve momentum to the last quantum' grep -q '^momentum error  *0  (0 0 0 quanta' out
+holds 'angular momentum is told where nothing acts from outside' grep -q '^angular mom. error  *[0-9]' out
+for scene in dam-break still-column free-fall droplets; do
+    for dimension in 2d 3d; do
+        holds "$scene-$dimension runs" "$ascc" sim demo $scene-$dimension --size 5 -n 3
+    done
+done
+
+echo keep >d.safetensors
+refuses_to_finish() { ! run sim demo dam-break-2d --size 6 -n 5 --dt 1e9 -o d.safetensors; }
+refuses_to_finish
+report $? 'a step that fails is an error'
+holds 'and leaves the old file as it was' grep -q keep d.safetensors
+
+"$ascc" sim demo dam-break-3d -n 1000000 --every 5 -o e.safetensors >out 2>err &
+process=$!
+sleep 2
+kill -INT $process
+wait $process
+status=$?
+[ $status -eq 130 ] && grep -q 'interrupted after' err && [ -f e.safetensors ]
+report $? 'an interrupted run says so and ends with status 130'
+holds 'and its file is whole' "$ascc" info e.safetensors
+
+if command -v script >/dev/null 2>&1; then
+    script -qec "'$ascc' sim demo dam-break-3d -n 30" /dev/null >out 2>err </dev/null
+    grep -q 'stepping \[' out
+    report $? 'a terminal gets a progress bar'
+fi
+echo "1..$number"
+exit $failed

@@ -1,0 +1,83 @@
+#!/bin/sh
+# Installs into a new folder, builds both hosts against what was installed, runs them; prints TAP.
+# $1: a build folder. SPDX-License-Identifier: MIT
+cd "$(dirname "$0")/.." || exit 1
+build=${1:-build}
+number=0
+failed=0
+folder=$(mktemp -d) || exit 1
+trap 'rm -rf "$folder"' EXIT
+
+# check NAME COMMAND...: passes when the command does; shows its output when it does not.
+check() {
+    number=$((number + 1))
+    name=$1
+    shift
+    if "$@" >"$folder/out" 2>&1; then
+        echo "ok $number - $name"
+    else
+        echo "not ok $number - $name"
+        sed 's/^/# /' "$folder/out"
+        failed=1
+    fi
+}
+
+# Moves the whole installation: nothing may depend on where it was configured to go.
+install_it() {
+    DESTDIR="$folder" meson install -C "$build" --no-rebuild --quiet || return 1
+    prefix=$(meson introspect --buildoptions "$build" |
+        sed 's/.*"name": "prefix", "value": "\([^"]*\)".*/\1/')
+    mv "$folder$prefix" "$folder/root" && pc=$(find "$folder/root" -name ascc.pc) && [ -n "$pc" ] &&
+        sed -i "s|^prefix=.*|prefix=$folder/root|" "$pc" && libdir=$(dirname "$pc")/..
+}
+check 'it installs' install_it
+libdir=$(cd "$libdir" && pwd)
+export PKG_CONFIG_PATH="$libdir/pkgconfig" LD_LIBRARY_PATH="$libdir"
+
+warnings='-Wall -Wextra -Wpedantic -Werror'
+flags=$(pkg-config --cflags --libs ascc)
+pkg_version() { [ "$(pkg-config --modversion ascc)" = "$("$folder/root/bin/ascc" version | cut -d' ' -f2)" ]; }
+check 'pkg-config and the program agree on the version' pkg_version
+
+# shellcheck disable=SC2086
+{
+    check 'hello.c builds as C99' cc -std=c99 $warnings examples/hello.c -o "$folder/hello" $flags
+    check 'hello.cpp builds as C++11' \
+        c++ -std=c++11 $warnings examples/hello.cpp -o "$folder/hello_cpp" $flags
+    printf '#include <ascc/ascc.h>\n' >"$folder/header.c"
+    cp "$folder/header.c" "$folder/header.cpp"
+    for standard in c99 c11; do
+        check "the header compiles alone as $standard" \
+            cc -std=$standard $warnings -Wconversion -c "$folder/header.c" -o "$folder/header.o" $flags
+    done
+    check 'the header compiles alone as c++11' \
+        c++ -std=c++11 $warnings -Wconversion -c "$folder/header.cpp" -o "$folder/header.o" $flags
+    # The demonstration model as a file, written by the public API alone.
+    check 'a model is saved through the installed library' sh -c '
+        cc -std=c11 "$1/tests/support/save_demo.c" "$1/examples/demo_model.c" -o "$2/save_demo" $3 -lm &&
+            "$2/save_demo" 3 "$2/demo3.safetensors" && "$2/save_demo" 2 "$2/demo2.safetensors"' \
+        sh "$PWD" "$folder" "$flags"
+}
+for host in hello hello_cpp; do
+    for dimension in 2 3; do
+        check "$host runs in ${dimension}D" "$folder/$host" "$folder/demo$dimension.safetensors"
+    done
+    refuses() { "$folder/$host" /nonexistent; [ $? -eq 1 ]; }
+    check "$host says so when there is no model" refuses
+done
+
+library=$(readlink -f "$libdir/libascc.so")
+dynamic=$(readelf -d "$library")
+soname() { echo "$dynamic" | grep 'SONAME.*\[libascc\.so\.0\]'; }
+check 'the soname is libascc.so.0' soname
+needs() {
+    ! echo "$dynamic" | sed -n 's/.*(NEEDED).*\[\(.*\)\]/\1/p' |
+        grep -vE '^(libc|libm|libpthread|ld-linux.*)\.so'
+}
+check 'it needs libc, libm and threads alone' needs
+exports() { nm -D --defined-only "$library" | awk '{ print $3 }' | LC_ALL=C sort | diff - tests/exports.txt; }
+check 'it exports what tests/exports.txt lists' exports
+only_ours() { ! nm -D --defined-only "$library" | awk '{ print $3 }' | grep -v '^ascc_'; }
+check 'it exports nothing but ascc_*' only_ours
+echo "1..$number"
+exit $failed

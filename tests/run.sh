@@ -1,0 +1,67 @@
+#!/bin/sh
+# Sets up, builds and runs all tests: release and sanitizers. Ends with "N passed, N failed".
+# SPDX-License-Identifier: MIT
+set -u
+cd "$(dirname "$0")/.." || exit 1
+. tests/setup.sh
+setup || exit 1
+
+passed=0
+failed=0
+
+# Counts the TAP lines of a log and shows what failed or was skipped.
+count() {
+    passed=$((passed + $(grep '^ok ' "$1" | grep -vc '# SKIP')))
+    failed=$((failed + $(grep -c '^not ok ' "$1")))
+    grep -E '^(not ok|# SKIP|SKIP)|# SKIP' "$1" | sort | uniq -c
+}
+
+# One whole build in its own folder: NAME, then meson options.
+suite() {
+    name=$1
+    shift
+    echo "== $name"
+    if [ -d "build-$name" ]; then
+        meson setup --reconfigure "build-$name" "$@" >"build-$name.log" 2>&1
+    else
+        meson setup "build-$name" "$@" >"build-$name.log" 2>&1
+    fi
+    if [ $? -ne 0 ] || ! ninja -C "build-$name" >>"build-$name.log" 2>&1; then
+        tail -n 30 "build-$name.log"
+        echo "not ok - $name does not build"
+        failed=$((failed + 1))
+        return
+    fi
+    for program in "build-$name"/tests/test_*; do
+        [ -x "$program" ] && [ -f "$program" ] || continue
+        log="$program.log"
+        CMOCKA_MESSAGE_OUTPUT=TAP "$program" >"$log" 2>&1
+        status=$?
+        count "$log"
+        if [ $status -ne 0 ]; then
+            echo "not ok - $program ended with status $status"
+            tail -n 25 "$log"
+            grep -q '^not ok ' "$log" || failed=$((failed + 1))
+        fi
+    done
+}
+
+# A script that prints TAP lines itself.
+script() {
+    echo "== $1"
+    log="build-release/$(basename "$1").log"
+    sh "$@" >"$log" 2>&1 || { grep -q '^not ok ' "$log" || { tail -n 25 "$log"; failed=$((failed + 1)); }; }
+    count "$log"
+}
+
+export ASAN_OPTIONS=detect_leaks=1
+suite release --buildtype=release
+suite sanitize --buildtype=debugoptimized -Db_sanitize=address,undefined -Db_lundef=false \
+    -Db_ndebug=false
+for t in tests/check_tree.sh tests/install_test.sh tests/cli_test.sh tests/docs_test.sh tests/convert_test.sh tests/cross_test.sh; do
+    [ -f "$t" ] && script "$t" build-release
+done
+script tests/cli_test.sh build-sanitize
+
+echo "$passed passed, $failed failed"
+[ "$failed" -eq 0 ]

@@ -1,0 +1,31 @@
+# Installs what building and testing need, where that is possible; sourced by run.sh and quickstart.sh.
+# SPDX-License-Identifier: MIT
+
+packages="build-essential meson ninja-build pkg-config libcmocka-dev libpng-dev libjansson-dev"
+
+setup_have() {
+    command -v meson >/dev/null 2>&1 && command -v ninja >/dev/null 2>&1 &&
+        command -v cc >/dev/null 2>&1 && command -v c++ >/dev/null 2>&1 &&
+        command -v pkg-config >/dev/null 2>&1 &&
+        pkg-config --exists cmocka libpng jansson 2>/dev/null
+}
+
+setup() {
+    setup_have && return 0
+    if command -v apt-get >/dev/null 2>&1; then
+        as_root=""
+        if [ "$(id -u)" -ne 0 ]; then
+            command -v sudo >/dev/null 2>&1 && as_root="sudo"
+        fi
+        if [ "$(id -u)" -eq 0 ] || [ -n "$as_root" ]; then
+            echo "Installing: $packages"
+            $as_root env DEBIAN_FRONTEND=noninteractive apt-get update -q >/dev/null
+            # shellcheck disable=SC2086
+            $as_root env DEBIAN_FRONTEND=noninteractive apt-get install -q -y $packages >/dev/null
+        fi
+    fi
+    setup_have && return 0
+    echo "Please install a C and C++ compiler, Meson >= 1.0, ninja, pkg-config, cmocka, libpng and" >&2
+    echo "jansson with their headers (Debian's names: $packages) and try again." >&2
+    return 1
+}

@@ -1,0 +1,318 @@
+/* `ascc eval` on sequences whose errors are known, with a method added as a newcomer would.
+ * SPDX-License-Identifier: MIT
+ *
+ * Linked with eval.c but not with methods.c: the table of methods is this file's.
+ */
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <cmocka.h>
+
+#include "commands.h"
+#include "method.h"
+#include "sequence.h"
+
+/* ---- A method of one's own: the fluid stays where it is (docs/measures.md shows this) --------- */
+
+typedef struct frozen {
+    size_t size;
+    double position[];
+} frozen;
+
+static bool frozen_open(const char *settings, const ascc_method_scene *scene, void **state,
+                        ascc_method_error *error)
+{
+    const size_t size = scene->fluid_count * (size_t)scene->dimension * sizeof(double);
+    frozen *f = malloc(sizeof *f + size);
+    (void)settings, (void)error;
+    if (f)
+        f->size = size;
+    return (*state = f) != NULL;
+}
+
+static bool frozen_set(void *state, const double *position, const double *velocity,
+                       ascc_velocity_kind kind, ascc_method_error *error)
+{
+    (void)velocity, (void)kind, (void)error;
+    memcpy(((frozen *)state)->position, position, ((frozen *)state)->size);
+    return true;
+}
+
+static bool frozen_advance(void *state, ascc_method_error *error)
+{
+    return state && error;
+}
+
+static void frozen_read(const void *state, double *position, double *velocity)
+{
+    memcpy(position, ((const frozen *)state)->position, ((const frozen *)state)->size);
+    memset(velocity, 0, ((const frozen *)state)->size);
+}
+
+static const ascc_method method_frozen = {
+    .prefix = "frozen",
+    .help = "frozen         nothing moves",
+    .open = frozen_open,
+    .set = frozen_set,
+    .advance = frozen_advance,
+    .read = frozen_read,
+    .close = free,
+};
+
+/* ---- Methods that fail ----------------------------------------------------------------------- */
+
+static bool broken_advance(void *state, ascc_method_error *error)
+{
+    (void)state;
+    snprintf(error->text, sizeof error->text, "it \"broke\"");
+    return false;
+}
+
+static void lost_read(const void *state, double *position, double *velocity)
+{
+    frozen_read(state, position, velocity);
+    position[3] = NAN;
+}
+
+static const ascc_method method_broken = {.prefix = "broken",
+                                          .help = "",
+                                          .open = frozen_open,
+                                          .set = frozen_set,
+                                          .advance = broken_advance,
+                                          .read = frozen_read,
+                                          .close = free};
+static const ascc_method method_lost = {.prefix = "lost",
+                                        .help = "",
+                                        .open = frozen_open,
+                                        .set = frozen_set,
+                                        .advance = frozen_advance,
+                                        .read = lost_read,
+                                        .close = free};
+
+const ascc_method *const ascc_methods[] = {&ascc_method_ballistic, &method_frozen, &method_broken,
+                                           &method_lost, NULL};
+
+/* ---- Sequences ------------------------------------------------------------------------------- */
+
+enum { SIDE = 5, COUNT = SIDE * SIDE * SIDE, FRAMES = 61 };
+
+static const double DT = 0.02, SPEED = 0.5, GRAVITY = -9.81;
+
+/* Position of a row in free flight from a lattice, thrown along x. */
+static void flight(size_t row, double time, float position[3], float velocity[3])
+{
+    const double at[3] = {(double)(row % SIDE), (double)(row / SIDE % SIDE),
+                          (double)(row / SIDE / SIDE)};
+    for (size_t c = 0; c < 3; c++) {
+        const double v = c == 0 ? SPEED : 0.0, g = c == 1 ? GRAVITY : 0.0;
+        position[c] = (float)(0.05 * at[c] + time * (v + 0.5 * time * g));
+        velocity[c] = (float)(v + time * g);
+    }
+}
+
+static int write_sequence(void **state)
+{
+    char error[256] = "";
+    static float position[COUNT * 3], velocity[COUNT * 3], nothing[3];
+    ascc_sequence header = {.dimension = 3,
+                            .time_step = DT,
+                            .gravity = {0.0, GRAVITY, 0.0},
+                            .radius = 0.025,
+                            .mass = 0.1,
+                            .rest_density = 1000.0,
+                            .count = COUNT,
+                            .wall = nothing,
+                            .normal = nothing,
+                            .source = "thrown lattice"};
+    (void)state;
+    ascc_sequence_writer *writer =
+        ascc_sequence_create("test_eval.safetensors", &header, true, error, sizeof error);
+    for (size_t k = 0; k < FRAMES && writer; k++) {
+        for (size_t i = 0; i < COUNT; i++)
+            flight(i, (double)k * DT, &position[3 * i], &velocity[3 * i]);
+        if (!ascc_sequence_append(writer, position, velocity, error, sizeof error))
+            return -1;
+    }
+    if (!writer || !ascc_sequence_finish(writer, true, error, sizeof error)) {
+        fprintf(stderr, "%s\n", error);
+        return -1;
+    }
+    return 0;
+}
+
+static int remove_files(void **state)
+{
+    (void)state;
+    (void)remove("test_eval.safetensors");
+    (void)remove("test_eval.json");
+    (void)remove("test_eval_2.json");
+    (void)remove("test_eval.csv");
+    return 0;
+}
+
+static char *read_text(const char *path)
+{
+    static char text[2][65536];
+    static int turn;
+    char *into = text[turn = !turn];
+    FILE *file = fopen(path, "r");
+    assert_non_null(file);
+    into[fread(into, 1, sizeof text[0] - 1, file)] = 0;
+    fclose(file);
+    return into;
+}
+
+/* Runs `ascc eval METHOD test_eval.safetensors --json PATH ...`. */
+static int evaluate(const char *method, const char *json, const char *option, const char *value)
+{
+    const char *arguments[7] = {method, "test_eval.safetensors", "--quiet", "--json", json, option,
+                                value};
+    char copy[7][64], *argv[8];
+    int argc = 0;
+    for (; argc < 7 && arguments[argc]; argc++) {
+        snprintf(copy[argc], sizeof copy[argc], "%s", arguments[argc]);
+        argv[argc] = copy[argc];
+    }
+    argv[argc] = NULL;
+    return ascc_command_eval(argc, argv);
+}
+
+static bool has(const char *text, const char *name, const char *value)
+{
+    char line[128];
+    snprintf(line, sizeof line, "\"%s\": %s", name, value);
+    return strstr(text, line) != NULL;
+}
+
+static double figure(const char *text, const char *name)
+{
+    char line[64];
+    snprintf(line, sizeof line, "\"%s\": ", name);
+    const char *at = strstr(text, line);
+    if (!at)
+        fail_msg("no figure %s", name);
+    return strtod(at + strlen(line), NULL);
+}
+
+static void assert_near(double got, double expected, double bound)
+{
+    if (!(fabs(got - expected) <= bound))
+        fail_msg("got %.9g, expected %.9g within %.3g", got, expected, bound);
+}
+
+/* Files hold floats of up to 8 m: off by 2.4e-7 m each, so differences over dt by 5e-5 m/s. */
+static const double ROUNDING = 1e-6;
+
+static void free_flight_has_no_error(void **state)
+{
+    (void)state;
+    assert_int_equal(evaluate("ballistic", "test_eval.json", NULL, NULL), 0);
+    const char *text = read_text("test_eval.json");
+    assert_near(figure(text, "starts_stored"), 12.0, 0.0);    /* 0, 5, ... 55 */
+    assert_near(figure(text, "starts_difference"), 5.0, 0.0); /* 10, 20, ... 50 */
+    assert_near(figure(text, "err_n1_stored"), 0.0, ROUNDING);
+    assert_near(figure(text, "err_n2_stored"), 0.0, ROUNDING);
+    assert_near(figure(text, "err_n2_difference"), 0.0, 4 * ROUNDING);
+    assert_near(figure(text, "gt2pred_mean"), 0.0, ROUNDING);
+    assert_near(figure(text, "chamfer_final_pred2gt"), 0.0, ROUNDING);
+    assert_near(figure(text, "density_max_error"), 0.0, 1e-4);
+    assert_near(figure(text, "jsd_mean"), 0.0, 0.0);
+    assert_near(figure(text, "min_pair_distance"), 0.05, ROUNDING);
+    assert_near(figure(text, "kinetic_0"), 0.5 * 0.1 * COUNT * SPEED * SPEED, 1e-9);
+    assert_near(figure(text, "momentum_drift_max"), 0.0, 1e-11);
+    assert_near(figure(text, "energy_gain_max"), 0.0, 1e-9);
+    assert_near(figure(text, "last_frame"), FRAMES - 1, 0.0);
+}
+
+static void a_method_of_ones_own_is_measured(void **state)
+{
+    (void)state;
+    assert_int_equal(evaluate("frozen", "test_eval.json", "--frames", "0:1:1"), 0);
+    const char *text = read_text("test_eval.json");
+    const double one = hypot(DT * SPEED, 0.5 * DT * DT * GRAVITY);
+    const double two = hypot(2 * DT * SPEED, 2.0 * DT * DT * GRAVITY);
+    assert_near(figure(text, "starts_stored"), 1.0, 0.0);
+    assert_near(figure(text, "err_n1_stored"), one, ROUNDING);
+    assert_near(figure(text, "err_n2_stored"), two, ROUNDING);
+    assert_near(figure(text, "mean_error_2"), two, ROUNDING);
+    assert_near(figure(text, "rmse_1"), one, ROUNDING);
+    assert_near(figure(text, "com_offset_x"), -SPEED * DT * (FRAMES - 1), ROUNDING);
+    assert_near(figure(text, "kinetic_50"), 0.0, 0.0);
+    assert_true(has(text, "momentum_drift_max", "null"));
+}
+
+static void the_same_input_gives_the_same_bytes(void **state)
+{
+    (void)state;
+    assert_int_equal(evaluate("frozen", "test_eval.json", "--threads", "1"), 0);
+    assert_int_equal(evaluate("frozen", "test_eval_2.json", "--threads", "3"), 0);
+    assert_string_equal(read_text("test_eval.json"), read_text("test_eval_2.json"));
+}
+
+static void a_method_that_stops_says_why(void **state)
+{
+    (void)state;
+    assert_int_equal(evaluate("broken", "test_eval.json", NULL, NULL), 0);
+    const char *text = read_text("test_eval.json");
+    assert_true(has(text, "note", "\"stopped after frame 0: it \\\"broke\\\"\""));
+    assert_true(has(text, "err_n1_stored", "null"));
+    assert_true(has(text, "chamfer_final_gt2pred", "null"));
+    assert_true(has(text, "last_frame", "0"));
+}
+
+static void a_lost_particle_is_counted_and_hides_nothing(void **state)
+{
+    (void)state;
+    assert_int_equal(evaluate("lost", "test_eval.json", NULL, NULL), 0);
+    const char *text = read_text("test_eval.json");
+    assert_true(has(text, "non_finite_max", "1"));
+    assert_true(has(text, "err_n1_stored", "null"));
+    assert_true(has(text, "gt2pred_mean", "null"));
+    assert_true(has(text, "density_max_error", "null"));
+    assert_true(has(text, "published_density_error", "null"));
+    assert_true(has(text, "min_pair_distance", "null"));
+    assert_true(has(text, "max_speed", "null"));
+    assert_true(has(text, "momentum_error", "null"));
+    assert_true(has(text, "kinetic_50", "null"));
+}
+
+static void figures_are_lines_of_csv(void **state)
+{
+    (void)state;
+    assert_int_equal(evaluate("frozen", "test_eval.json", "--csv", "test_eval.csv"), 0);
+    const char *text = read_text("test_eval.csv");
+    assert_memory_equal(text, "method,sequence,figure,value\n", 29);
+    assert_non_null(strstr(text, "\n\"frozen\",\"test_eval\",frames,61\n"));
+    assert_non_null(strstr(text, "\n\"frozen\",\"test_eval\",momentum_drift_max,\n"));
+}
+
+static void what_is_not_understood_is_refused(void **state)
+{
+    (void)state;
+    assert_int_equal(evaluate("frozen", "test_eval.json", "--threads", "0"), 2);
+    assert_int_equal(evaluate("frozen", "test_eval.json", "--frames", "1:2"), 2);
+    assert_int_equal(evaluate("frozen", "test_eval.json", "--velocity", "any"), 2);
+    assert_int_equal(evaluate("frozen", "test_eval.json", "--none", "1"), 2);
+    assert_int_equal(evaluate("nobody", "test_eval.json", NULL, NULL), 2);
+    assert_int_equal(evaluate("frozen", "no/such/folder.json", NULL, NULL), 1);
+    assert_int_equal(evaluate("frozen", "test_eval.json", "absent.safetensors", NULL), 1);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(free_flight_has_no_error),
+        cmocka_unit_test(a_method_of_ones_own_is_measured),
+        cmocka_unit_test(the_same_input_gives_the_same_bytes),
+        cmocka_unit_test(a_method_that_stops_says_why),
+        cmocka_unit_test(a_lost_particle_is_counted_and_hides_nothing),
+        cmocka_unit_test(figures_are_lines_of_csv),
+        cmocka_unit_test(what_is_not_understood_is_refused),
+    };
+    return cmocka_run_group_tests(tests, write_sequence, remove_files);
+}
