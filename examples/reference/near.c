@@ -210,8 +210,7 @@ static ascc_status search(near_state *n, const ascc_points *points, double radiu
                       .radius = radius,
                       .same = true,
                       .skip_self = true,
-                      .max_neighbors = MOST_NEIGHBORS,
-                      .mapping = -1};
+                      .max_neighbors = MOST_NEIGHBORS};
     if (!wanted)
         return ascc_fail(&l->message, ASCC_ERROR_MEMORY, "no memory for %zu points", points->count);
     for (size_t i = 0; i < points->count; i++)
