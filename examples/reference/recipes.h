@@ -1,0 +1,47 @@
+/* Random scenes to generate data from: what lies where, how it moves, how long it is watched.
+ * SPDX-License-Identifier: MIT
+ *
+ * A recipe follows from its kind, seed and number alone.
+ */
+#ifndef REFERENCE_RECIPES_H
+#define REFERENCE_RECIPES_H
+
+#include "solids.h"
+#include "sph.h"
+
+#define RECIPE_SOLIDS 8
+
+/* Zero is the kind's own choice. */
+typedef struct recipe_options {
+    uint64_t seed, number;
+    int32_t dimension;
+    int32_t frames;
+    double spacing; /* m; lengths of the scene stay */
+} recipe_options;
+
+typedef struct recipe {
+    uint64_t number;
+    int32_t dimension, frames;
+    double spacing, frame; /* m; s between frames */
+    double gravity[3];
+    double speed; /* m/s, that the flow may reach: the speed of sound is ten times that */
+    solid solids[RECIPE_SOLIDS];
+    size_t solid_count;
+    size_t count;
+    double *position, *velocity; /* [count][dimension] */
+    double *depth;  /* [count] m of water at rest above; NULL = starts without pressure */
+    char text[512]; /* the scene in words, for the file */
+} recipe;
+
+/* Names of the kinds, NULL at the end, and a line about each. */
+extern const char *const recipe_kinds[][2];
+
+/* errors: ARGUMENT (unknown kind, dimension), MEMORY. recipe_free after success only. */
+ascc_status recipe_make(const char *kind, const recipe_options *options, recipe *made);
+void recipe_free(recipe *made);
+
+/* A solver with the recipe's fluid and walls; walls receives them. errors: MEMORY. */
+ascc_status recipe_solver(const recipe *made, int32_t thread_count, sph **solver,
+                          wall_points *walls);
+
+#endif

@@ -1,0 +1,463 @@
+/* The reference solvers, the generator and the linter. SPDX-License-Identifier: MIT */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include <cmocka.h>
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include "../examples/ascc/commands.h"
+#include "inspect.h"
+#include "pbf.h"
+#include "recipes.h"
+
+/* ---- SPH ---- */
+
+static void make(const char *kind, int32_t dimension, uint64_t number, double spacing, recipe *r)
+{
+    const recipe_options options = {
+        .seed = 7, .number = number, .dimension = dimension, .spacing = spacing};
+    assert_int_equal(recipe_make(kind, &options, r), ASCC_OK);
+}
+
+static sph *start(const recipe *r, int32_t threads)
+{
+    sph *s;
+    wall_points walls;
+    assert_int_equal(recipe_solver(r, threads, &s, &walls), ASCC_OK);
+    wall_points_free(&walls);
+    return s;
+}
+
+/* Each pair's forces are opposite numbers, so only the sums of N terms and the kicks round: a few
+ * hundred steps of 2^-53 relative to the sum of |v|. */
+static void momentum_without_walls_is_kept_to_rounding(void **state)
+{
+    (void)state;
+    for (int32_t d = 2; d <= 3; d++) {
+        recipe r;
+        make("droplets", d, 0, d == 2 ? 0.02 : 0.08, &r);
+        sph *s = start(&r, 1);
+        assert_int_equal(sph_advance(s, 0.2), ASCC_OK);
+        const sph_particle *p = sph_particles(s, NULL, NULL);
+        double sum[3] = {0}, size = 0.0;
+        for (size_t i = 0; i < r.count; i++)
+            for (int c = 0; c < d; c++) {
+                sum[c] += p[i].velocity[c] - r.velocity[i * (size_t)d + (size_t)c];
+                size += fabs(p[i].velocity[c]);
+            }
+        for (int c = 0; c < 3; c++)
+            assert_true(fabs(sum[c]) < 1e-13 * size);
+        sph_destroy(&s);
+        recipe_free(&r);
+    }
+}
+
+/* Pressure of the lowest row, continued to the floor, against the weight of the water. */
+static void bottom_carries_the_weight_of_the_column(void **state)
+{
+    (void)state;
+    for (int32_t d = 2; d <= 3; d++) {
+        recipe r;
+        make("still-column", d, 1, d == 2 ? 0.02 : 0.08, &r);
+        const double level = r.depth[0] + r.position[1];
+        sph *s = start(&r, 2);
+        double mean = 0.0;
+        for (int f = 0; f < 40; f++) {
+            assert_int_equal(sph_advance(s, 0.025), ASCC_OK);
+            const sph_particle *p = sph_particles(s, NULL, NULL);
+            double sum = 0.0, count = 0.0;
+            for (size_t i = 0; i < r.count; i++)
+                if (p[i].position[1] < r.spacing) {
+                    sum += p[i].pressure + 9810.0 * p[i].position[1];
+                    count += 1.0;
+                }
+            assert_true(count > 0.0);
+            mean += sum / count / 40.0;
+        }
+        /* the free surface is uncertain by half a spacing of some twenty or ten */
+        assert_true(fabs(mean / (9810.0 * level) - 1.0) < 0.5 * r.spacing / level);
+        sph_destroy(&s);
+        recipe_free(&r);
+    }
+}
+
+static void lattice_at_rest_keeps_its_density(void **state)
+{
+    (void)state;
+    recipe r;
+    make("still-column", 2, 0, 0.025, &r);
+    r.gravity[1] = 0.0;
+    free(r.depth);
+    r.depth = NULL;
+    sph *s = start(&r, 1);
+    assert_int_equal(sph_advance(s, 0.1), ASCC_OK);
+    const sph_particle *p = sph_particles(s, NULL, NULL);
+    for (size_t i = 0; i < r.count; i++) {
+        assert_true(fabs(p[i].density - 1000.0) < 1e-6);
+        assert_true(hypot(p[i].velocity[0], p[i].velocity[1]) < 1e-6);
+    }
+    sph_destroy(&s);
+    recipe_free(&r);
+}
+
+static void sph_bits_do_not_depend_on_threads(void **state)
+{
+    (void)state;
+    recipe r;
+    make("wbc2d", 0, 2, 0.025, &r);
+    sph *first = start(&r, 1);
+    assert_int_equal(sph_advance(first, 0.3), ASCC_OK);
+    const sph_particle *p = sph_particles(first, NULL, NULL);
+    for (int32_t threads = 2; threads <= 7; threads += 5) {
+        sph *other = start(&r, threads);
+        assert_int_equal(sph_advance(other, 0.3), ASCC_OK);
+        assert_memory_equal(p, sph_particles(other, NULL, NULL), r.count * sizeof *p);
+        sph_destroy(&other);
+    }
+    sph_destroy(&first);
+    recipe_free(&r);
+}
+
+static void bad_options_make_no_solver(void **state)
+{
+    (void)state;
+    const sph_options flat = {.dimension = 1, .spacing = 0.1, .sound_speed = 10.0};
+    const sph_options silent = {.dimension = 2, .spacing = 0.1};
+    const pbf_options small = {.dimension = 2};
+    assert_null(sph_create(&flat));
+    assert_null(sph_create(&silent));
+    assert_null(pbf_create(&small));
+}
+
+static void a_position_that_is_no_number_is_an_error(void **state)
+{
+    (void)state;
+    const sph_options options = {.dimension = 2, .spacing = 0.1, .sound_speed = 10.0};
+    const double position[2][2] = {{0.0, 0.0}, {NAN, 0.0}};
+    sph *s = sph_create(&options);
+    assert_int_equal(sph_set_fluid(s, 2, position[0], NULL), ASCC_OK);
+    assert_int_equal(sph_advance(s, 0.01), ASCC_ERROR_RANGE);
+    assert_non_null(strstr(sph_message(s), "point 1"));
+    sph_destroy(&s);
+}
+
+/* ---- PBF ---- */
+
+/* Runs a drop into a pool for 60 frames; positions into *end if wanted. */
+static double pool_error(int32_t iterations, int32_t threads, double (**end)[3], size_t *count)
+{
+    recipe r;
+    make("pool-drop", 2, 1, 0.025, &r);
+    const pbf_options o = {.dimension = 2,
+                           .thread_count = threads,
+                           .spacing = r.spacing,
+                           .gravity = {0.0, -9.81},
+                           .iterations = iterations};
+    wall_points walls = {0};
+    assert_true(solids_sample(r.solids, r.solid_count, 2, r.spacing, 3, &walls));
+    pbf *p = pbf_create(&o);
+    assert_int_equal(pbf_set_walls(p, walls.count, walls.position), ASCC_OK);
+    assert_int_equal(pbf_set_fluid(p, r.count, r.position, r.velocity), ASCC_OK);
+    double sum = 0.0, error;
+    for (int f = 0; f < 60; f++) {
+        assert_int_equal(pbf_advance(p, 0.005), ASCC_OK);
+        assert_int_equal(pbf_density_error(p, &error), ASCC_OK);
+        sum += error / 60.0;
+    }
+    if (end) {
+        *count = r.count;
+        *end = malloc(r.count * sizeof **end);
+        memcpy(*end, pbf_positions(p), r.count * sizeof **end);
+    }
+    pbf_destroy(&p);
+    wall_points_free(&walls);
+    recipe_free(&r);
+    return sum;
+}
+
+static void pbf_density_error_falls_with_iterations(void **state)
+{
+    (void)state;
+    double last = INFINITY;
+    for (int32_t iterations = 1; iterations <= 16; iterations *= 4) {
+        const double error = pool_error(iterations, 1, NULL, NULL);
+        assert_true(error < last);
+        last = error;
+    }
+    assert_true(last < 0.005);
+}
+
+static void pbf_bits_do_not_depend_on_threads(void **state)
+{
+    (void)state;
+    double(*one)[3], (*three)[3];
+    size_t count;
+    (void)pool_error(2, 1, &one, &count);
+    (void)pool_error(2, 3, &three, &count);
+    assert_memory_equal(one, three, count * sizeof *one);
+    free(one);
+    free(three);
+}
+
+static void pbf_lattice_has_rest_density(void **state)
+{
+    (void)state;
+    const pbf_options o = {.dimension = 3, .spacing = 0.1};
+    pbf *p = pbf_create(&o);
+    double position[125][3], error;
+    for (int i = 0; i < 125; i++)
+        for (int c = 0; c < 3; c++)
+            position[i][c] = 0.1 * (c == 0 ? i % 5 : c == 1 ? i / 5 % 5 : i / 25);
+    assert_int_equal(pbf_set_fluid(p, 125, position[0], NULL), ASCC_OK);
+    assert_int_equal(pbf_density_error(p, &error), ASCC_OK);
+    assert_true(error < 1e-6); /* nowhere above 1: the outer ones miss neighbours */
+    pbf_destroy(&p);
+}
+
+/* ---- Generator ---- */
+
+static int generate(const char *kind, const char *seed, const char *threads, const char *directory)
+{
+    char *arguments[] = {(char *)(uintptr_t)kind,
+                         "--seed",
+                         (char *)(uintptr_t)seed,
+                         "--count",
+                         "3",
+                         "--frames",
+                         "4",
+                         "--spacing",
+                         "0.025",
+                         "--threads",
+                         (char *)(uintptr_t)threads,
+                         "-o",
+                         (char *)(uintptr_t)directory};
+    return ascc_command_generate((int)(sizeof arguments / sizeof *arguments), arguments);
+}
+
+static char *read_all(const char *directory, const char *name, size_t *size)
+{
+    char path[512];
+    (void)snprintf(path, sizeof path, "%s/%s", directory, name);
+    FILE *file = fopen(path, "rb");
+    assert_non_null(file);
+    char *bytes = malloc(1 << 22);
+    *size = fread(bytes, 1, 1 << 22, file);
+    (void)fclose(file);
+    return bytes;
+}
+
+static void same_seed_gives_same_bytes(void **state)
+{
+    (void)state;
+    char one[] = "/tmp/ascc-one-XXXXXX", three[] = "/tmp/ascc-three-XXXXXX";
+    assert_non_null(mkdtemp(one));
+    assert_non_null(mkdtemp(three));
+    assert_int_equal(generate("wbc2d", "5", "1", one), 0);
+    assert_int_equal(generate("wbc2d", "5", "3", three), 0);
+    assert_int_equal(generate("wbc2d", "6", "2", one), 0);
+    size_t sizes[4];
+    char *a = read_all(one, "wbc2d_5_0001.safetensors", &sizes[0]);
+    char *b = read_all(three, "wbc2d_5_0001.safetensors", &sizes[1]);
+    char *c = read_all(one, "wbc2d_6_0001.safetensors", &sizes[2]);
+    char *d = read_all(one, "wbc2d_5_0002.safetensors", &sizes[3]);
+    assert_int_equal(sizes[0], sizes[1]);
+    assert_memory_equal(a, b, sizes[0]);
+    assert_true(sizes[0] != sizes[2] || memcmp(a, c, sizes[0]) != 0);
+    assert_true(sizes[0] != sizes[3] || memcmp(a, d, sizes[0]) != 0);
+    free(a);
+    free(b);
+    free(c);
+    free(d);
+}
+
+static void a_stopped_run_goes_on(void **state)
+{
+    (void)state;
+    char directory[] = "/tmp/ascc-resume-XXXXXX", path[512];
+    assert_non_null(mkdtemp(directory));
+    assert_int_equal(generate("ramps2d", "5", "2", directory), 0);
+    size_t size, again;
+    char *before = read_all(directory, "ramps2d_5_0001.safetensors", &size);
+    (void)snprintf(path, sizeof path, "%s/ramps2d_5_0001.safetensors", directory);
+    assert_int_equal(unlink(path), 0);
+    (void)snprintf(path, sizeof path, "%s/ramps2d_5_0000.safetensors", directory);
+    FILE *mark = fopen(path, "wb"); /* stands for a finished file: it is left alone */
+    (void)fputs("kept", mark);
+    (void)fclose(mark);
+    assert_int_equal(generate("ramps2d", "5", "2", directory), 0);
+    char *after = read_all(directory, "ramps2d_5_0001.safetensors", &again);
+    assert_int_equal(size, again);
+    assert_memory_equal(before, after, size);
+    free(after);
+    after = read_all(directory, "ramps2d_5_0000.safetensors", &again);
+    assert_int_equal(again, 4);
+    free(before);
+    free(after);
+}
+
+static void wrong_use_of_the_generator_is_refused(void **state)
+{
+    (void)state;
+    char *unknown[] = {"lava", "-o", "/tmp"};
+    char *nowhere[] = {"wbc2d"};
+    char *deep[] = {"wbc2d", "-o", "/tmp", "--dimension", "3"};
+    char *none[] = {"wbc2d", "-o", "/tmp", "--count", "0"};
+    assert_int_equal(ascc_command_generate(3, unknown), 2);
+    assert_int_equal(ascc_command_generate(1, nowhere), 2);
+    assert_int_equal(ascc_command_generate(5, deep), 2);
+    assert_int_equal(ascc_command_generate(5, none), 2);
+}
+
+static void every_kind_makes_a_scene_clear_of_its_walls(void **state)
+{
+    (void)state;
+    for (size_t k = 0; recipe_kinds[k][0]; k++)
+        for (uint64_t number = 0; number < 5; number++) {
+            recipe r;
+            make(recipe_kinds[k][0], 0, number, 0.0, &r);
+            assert_true(r.count > 100);
+            for (size_t i = 0; i < r.count && r.solid_count; i++) {
+                double at[3] = {0}, normal[3];
+                memcpy(at, r.position + i * (size_t)r.dimension, (size_t)r.dimension * sizeof *at);
+                assert_true(solids_distance(r.solids, r.solid_count, r.dimension, at, normal) >
+                            0.49 * r.spacing);
+            }
+            recipe_free(&r);
+        }
+}
+
+/* ---- Linter ---- */
+
+#define FRAMES 20
+
+/* Water falling for a moment in a box: 12 x 12 particles, 20 frames, and the walls below. */
+typedef struct lint_case {
+    float position[FRAMES][144][2];
+    float wall[40][2], normal[40][2];
+    inspect_input input;
+} lint_case;
+
+static lint_case *fall(void)
+{
+    lint_case *c = calloc(1, sizeof *c);
+    for (int f = 0; f < FRAMES; f++)
+        for (int i = 0; i < 144; i++) {
+            const double t = 0.0025 * f;
+            c->position[f][i][0] = (float)(0.1 + 0.0125 * (i % 12));
+            c->position[f][i][1] = (float)(0.1 + 0.0125 * (i / 12) - 0.5 * 9.81 * t * t);
+        }
+    for (int i = 0; i < 40; i++) {
+        const bool top = i >= 20; /* a floor and a lid, so that there is room to fall */
+        c->wall[i][0] = (float)(0.025 * (i % 20));
+        c->wall[i][1] = top ? 0.5f : -0.00625f;
+        c->normal[i][1] = top ? -1.0f : 1.0f;
+    }
+    c->input = (inspect_input){.dimension = 2,
+                               .frames = FRAMES,
+                               .count = 144,
+                               .time_step = 0.0025,
+                               .spacing = 0.0125,
+                               .gravity = {0.0, -9.81, 0.0},
+                               .position = c->position[0][0],
+                               .walls = 40,
+                               .wall = c->wall[0],
+                               .normal = c->normal[0]};
+    return c;
+}
+
+static void expect(lint_case *c, const char *verdict)
+{
+    inspection f;
+    assert_int_equal(inspect(&c->input, NULL, &f), ASCC_OK);
+    if (verdict) {
+        assert_non_null(f.verdict);
+        assert_string_equal(f.verdict, verdict);
+    } else {
+        assert_null(f.verdict);
+    }
+    free(c);
+}
+
+static void linter_accepts_water_that_falls(void **state)
+{
+    (void)state;
+    expect(fall(), NULL);
+}
+
+static void linter_rejects_a_spike(void **state)
+{
+    (void)state;
+    lint_case *c = fall();
+    c->position[10][5][0] += 0.06f; /* 24 m/s for one frame, where 3 m/s can be reached */
+    expect(c, "spikes");
+}
+
+static void linter_rejects_an_escape(void **state)
+{
+    (void)state;
+    lint_case *c = fall();
+    for (int f = 0; f < FRAMES; f++) {
+        c->position[f][3][1] = -0.02f; /* more than a spacing below the floor */
+        c->position[f][3][0] = 0.3f;
+    }
+    expect(c, "escapes");
+}
+
+static void linter_rejects_clumps(void **state)
+{
+    (void)state;
+    lint_case *c = fall();
+    for (int f = 0; f < FRAMES; f++)
+        for (int i = 0; i < 3; i++)
+            c->position[f][i][0] = 0.1f + 0.004f * (float)i;
+    expect(c, "clumps");
+}
+
+static void linter_accepts_a_pair_that_meets(void **state)
+{
+    (void)state;
+    lint_case *c = fall();
+    c->position[7][1][0] = c->position[7][0][0] + 0.003f;
+    expect(c, NULL);
+}
+
+static void linter_rejects_what_is_no_number(void **state)
+{
+    (void)state;
+    lint_case *c = fall();
+    c->position[7][1][0] = NAN;
+    expect(c, "not finite");
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(momentum_without_walls_is_kept_to_rounding),
+        cmocka_unit_test(bottom_carries_the_weight_of_the_column),
+        cmocka_unit_test(lattice_at_rest_keeps_its_density),
+        cmocka_unit_test(sph_bits_do_not_depend_on_threads),
+        cmocka_unit_test(bad_options_make_no_solver),
+        cmocka_unit_test(a_position_that_is_no_number_is_an_error),
+        cmocka_unit_test(pbf_density_error_falls_with_iterations),
+        cmocka_unit_test(pbf_bits_do_not_depend_on_threads),
+        cmocka_unit_test(pbf_lattice_has_rest_density),
+        cmocka_unit_test(same_seed_gives_same_bytes),
+        cmocka_unit_test(a_stopped_run_goes_on),
+        cmocka_unit_test(wrong_use_of_the_generator_is_refused),
+        cmocka_unit_test(every_kind_makes_a_scene_clear_of_its_walls),
+        cmocka_unit_test(linter_accepts_water_that_falls),
+        cmocka_unit_test(linter_rejects_a_spike),
+        cmocka_unit_test(linter_rejects_an_escape),
+        cmocka_unit_test(linter_rejects_clumps),
+        cmocka_unit_test(linter_accepts_a_pair_that_meets),
+        cmocka_unit_test(linter_rejects_what_is_no_number),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
