@@ -170,19 +170,27 @@ void *ascc_arena_take(ascc_arena *arena, size_t count, size_t element)
     return piece;
 }
 
+bool ascc_arena_reserve(ascc_arena *arena, size_t size)
+{
+    assert(arena->used == 0 && arena->overflow == NULL);
+    if (size <= arena->block_size)
+        return true;
+    unsigned char *const block = ascc_allocate(arena->allocator, 1, size);
+    if (block == NULL)
+        return false;
+    release_block(arena);
+    arena->block = block;
+    arena->block_size = size;
+    return true;
+}
+
 void ascc_arena_reset(ascc_arena *arena)
 {
     release_overflow(arena);
-    if (arena->needed > arena->block_size) {
-        const size_t size = arena->needed + arena->needed / 4;
-        unsigned char *const block = ascc_allocate(arena->allocator, 1, size);
-        if (block != NULL) {
-            release_block(arena);
-            arena->block = block;
-            arena->block_size = size;
-        }
-    }
+    const size_t needed = arena->needed;
     arena->used = arena->needed = 0;
+    if (needed > arena->block_size)
+        (void)ascc_arena_reserve(arena, needed + needed / 4); /* else the next step asks again */
 }
 
 size_t ascc_arena_size(const ascc_arena *arena)

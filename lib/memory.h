@@ -52,6 +52,8 @@ void *ascc_arena_take(ascc_arena *arena, size_t count, size_t element);
 /* Gives back everything handed out. Never fails: without memory for a larger block it keeps the
  * old. */
 void ascc_arena_reset(ascc_arena *arena);
+/* Makes the block at least this large, before anything is taken. False and unchanged without memory. */
+bool ascc_arena_reserve(ascc_arena *arena, size_t size);
 /* Bytes held now. */
 size_t ascc_arena_size(const ascc_arena *arena);
 

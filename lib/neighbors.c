@@ -368,14 +368,19 @@ static bool rows_reserve(ascc_rows *rows, ascc_arena *arena, size_t capacity)
     return true;
 }
 
+/* A neighbour and how far it is. */
+typedef struct distance {
+    float square;
+    uint32_t row;
+} distance;
+
 typedef struct rows_job {
     ascc_rows *rows;
     const ascc_search_tools *tools;
     const uint8_t *wanted;
     uint32_t *scratch; /* [slots][scratch_size] */
-    uint32_t
-        *cut_row; /* [query count], with a limit: the last neighbour kept, by (distance, row) */
-    float *cut;
+    distance *cut;     /* [query count], with a limit: the last neighbour kept */
+    distance *heap;    /* [slots][limit] */
     size_t scratch_size;
     atomic_size_t used;
     atomic_uint crowded; /* 1 + a query row with too many neighbours */
@@ -402,41 +407,72 @@ static bool farther(float a, uint32_t a_row, float b, uint32_t b_row)
     return a > b || (a == b && a_row > b_row);
 }
 
-/* Drops all but the `limit` nearest of found[count], coincident ones and the query itself kept apart:
- * the query does not count. Order is kept. Tells the last one kept. */
-static size_t keep_nearest(const ascc_rows *rows, const int32_t at[3], uint32_t query,
-                           uint32_t *found, size_t count, float *cut, uint32_t *cut_row)
+/* Puts the root of a heap, the farthest on top, where it belongs. */
+static void sink(distance *heap, size_t count)
 {
-    *cut = INFINITY;
-    *cut_row = UINT32_MAX;
-    for (;;) { /* drop the farthest until few enough are left */
-        size_t others = 0, worst = 0;
-        float worst_distance = -1.0f;
-        for (size_t k = 0; k < count; k++) {
-            if (rows->same && found[k] == query)
-                continue;
-            others++;
-            const float d = squared_distance(at, rows->source, found[k]);
-            if (worst_distance < 0.0f || farther(d, found[k], worst_distance, found[worst])) {
-                worst_distance = d;
-                worst = k;
-            }
-        }
-        if (others <= (size_t)rows->limit) {
-            if (others == (size_t)rows->limit) {
-                *cut = worst_distance;
-                *cut_row = found[worst];
-            }
-            return count;
-        }
-        memmove(found + worst, found + worst + 1, (count - worst - 1) * sizeof *found);
-        count--;
+    const distance moved = heap[0];
+    size_t at = 0;
+    for (;;) {
+        size_t child = 2 * at + 1;
+        if (child + 1 < count && farther(heap[child + 1].square, heap[child + 1].row,
+                                         heap[child].square, heap[child].row))
+            child++;
+        if (child >= count ||
+            !farther(heap[child].square, heap[child].row, moved.square, moved.row))
+            break;
+        heap[at] = heap[child];
+        at = child;
     }
+    heap[at] = moved;
+}
+
+static void rise(distance *heap, size_t at)
+{
+    const distance moved = heap[at];
+    for (; at > 0; at = (at - 1) / 2) {
+        const distance parent = heap[(at - 1) / 2];
+        if (!farther(moved.square, moved.row, parent.square, parent.row))
+            break;
+        heap[at] = parent;
+    }
+    heap[at] = moved;
+}
+
+/* Drops all but the `limit` nearest of found[count]; the query itself does not count and stays. Order
+ * is kept. Tells the last one kept, or that all were. heap has room for `limit`. */
+static size_t keep_nearest(const ascc_rows *rows, const int32_t at[3], uint32_t query,
+                           uint32_t *found, size_t count, distance *heap, distance *cut)
+{
+    const size_t limit = (size_t)rows->limit;
+    size_t others = 0;
+    for (size_t k = 0; k < count; k++) {
+        if (rows->same && found[k] == query)
+            continue;
+        const distance d = {squared_distance(at, rows->source, found[k]), found[k]};
+        if (others < limit) {
+            heap[others] = d;
+            rise(heap, others);
+        } else if (farther(heap[0].square, heap[0].row, d.square, d.row)) {
+            heap[0] = d;
+            sink(heap, limit);
+        }
+        others++;
+    }
+    *cut = (distance){INFINITY, UINT32_MAX};
+    if (others < limit)
+        return count;
+    *cut = heap[0];
+    size_t kept = 0;
+    for (size_t k = 0; k < count; k++)
+        if ((rows->same && found[k] == query) ||
+            !farther(squared_distance(at, rows->source, found[k]), found[k], cut->square, cut->row))
+            found[kept++] = found[k];
+    return kept;
 }
 
 /* Appends the neighbours of one query within a run of slots; false when there are too many. */
 static bool search_run(const rows_job *job, size_t begin, size_t end, const int32_t at[3],
-                       uint32_t query, uint32_t *found, size_t *count)
+                       uint32_t query, uint32_t *found, size_t *count, distance *heap)
 {
     const ascc_rows *rows = job->rows;
     const ascc_grid *grid = rows->source_grid;
@@ -459,9 +495,8 @@ static bool search_run(const rows_job *job, size_t begin, size_t end, const int3
         if (*count > (size_t)rows->max_neighbors) {
             if (!rows->limit)
                 return false;
-            float cut;
-            uint32_t cut_row;
-            *count = keep_nearest(rows, at, query, found, *count, &cut, &cut_row);
+            distance cut;
+            *count = keep_nearest(rows, at, query, found, *count, heap, &cut);
         }
         begin = stop;
     }
@@ -523,6 +558,7 @@ static void make_rows(void *data, size_t begin, size_t end, int32_t slot)
     ascc_rows *rows = job->rows;
     const ascc_grid *grid = rows->query_grid;
     uint32_t *found = job->scratch + (size_t)slot * job->scratch_size;
+    distance *heap = rows->limit ? job->heap + (size_t)slot * (size_t)rows->limit : NULL;
     run runs[9] = {0};
     for (size_t c = begin; c < end; c++) {
         int n = 0;
@@ -536,14 +572,13 @@ static void make_rows(void *data, size_t begin, size_t end, int32_t slot)
             low_words(rows->query, row, at);
             size_t count = 0;
             for (int r = 0; r < n; r++)
-                if (!search_run(job, runs[r].begin, runs[r].end, at, (uint32_t)row, found,
-                                &count)) {
+                if (!search_run(job, runs[r].begin, runs[r].end, at, (uint32_t)row, found, &count,
+                                heap)) {
                     atomic_store_explicit(&job->crowded, (unsigned)row + 1, memory_order_relaxed);
                     return;
                 }
             if (rows->limit)
-                count = keep_nearest(rows, at, (uint32_t)row, found, count, &job->cut[row],
-                                     &job->cut_row[row]);
+                count = keep_nearest(rows, at, (uint32_t)row, found, count, heap, &job->cut[row]);
             store_row(job, row, found, count);
         }
     }
@@ -577,7 +612,7 @@ static void drop_one_sided(void *data, size_t begin, size_t end, int32_t slot)
         for (size_t k = 0; k < rows->count[i]; k++) {
             const uint32_t j = neighbor[k];
             const float d = squared_distance(at, rows->source, j);
-            if (j != i && farther(d, (uint32_t)i, job->cut[j], job->cut_row[j]))
+            if (j != i && farther(d, (uint32_t)i, job->cut[j].square, job->cut[j].row))
                 continue;
             neighbor[kept++] = j;
         }
@@ -599,9 +634,9 @@ ascc_status ascc_rows_make(ascc_rows *rows, const ascc_search_tools *tools, cons
     job.scratch = ascc_arena_take(tools->arena, slots * job.scratch_size, sizeof *job.scratch);
     if (rows->limit) {
         job.cut = ascc_arena_take(tools->arena, rows->query->count, sizeof *job.cut);
-        job.cut_row = ascc_arena_take(tools->arena, rows->query->count, sizeof *job.cut_row);
+        job.heap = ascc_arena_take(tools->arena, slots * (size_t)rows->limit, sizeof *job.heap);
     }
-    if (!job.scratch || (rows->limit && (!job.cut || !job.cut_row)))
+    if (!job.scratch || (rows->limit && (!job.cut || !job.heap)))
         return ascc_fail(tools->message, ASCC_ERROR_MEMORY, "no memory for a neighbour search");
     if (!rows->neighbor && !rows_reserve(rows, tools->arena, rows->capacity))
         return ascc_fail(tools->message, ASCC_ERROR_MEMORY, "no memory for %zu neighbours",

@@ -6,6 +6,7 @@
 
 #include "antisymmetric.h"
 #include "arrays.h"
+#include "estimate.h"
 #include "integrate.h"
 
 #define DEFAULT_MAX_NEIGHBORS 4096
@@ -96,6 +97,28 @@ void ascc_step_destroy(ascc_step **step)
     s->magic = 0;
     ascc_release(&context->allocator, s, 1, sizeof *s);
     ascc_context_release(context);
+}
+
+size_t ascc_step_estimate(const ascc_step *step, size_t fluid, size_t boundary)
+{
+    if (!step || step->magic != ASCC_STEP_MAGIC)
+        return 0;
+    return ascc_estimate_scratch(&step->network, fluid, boundary,
+                                 ascc_workers_count(step->context->workers));
+}
+
+ascc_status ascc_step_reserve(ascc_step *step, size_t fluid, size_t boundary)
+{
+    if (!step || step->magic != ASCC_STEP_MAGIC)
+        return ASCC_ERROR_ARGUMENT;
+    const size_t size = ascc_step_estimate(step, fluid, boundary);
+    ascc_arena_reset(&step->arena);
+    if (!ascc_arena_reserve(&step->arena, size)) {
+        ascc_fail(&step->message, ASCC_ERROR_MEMORY, "no memory for %zu bytes of scratch", size);
+        ascc_context_log(step->context, step->message.text);
+        return ASCC_ERROR_MEMORY;
+    }
+    return ASCC_OK;
 }
 
 const char *ascc_step_message(const ascc_step *step)

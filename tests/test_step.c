@@ -757,6 +757,68 @@ static void each_failing_allocation_leaves_the_particles_as_they_were(void **sta
     assert_true(test_memory_is_clean(&c));
 }
 
+/* A jittered block of side^dimension particles. */
+static void set_block(world *w, int side)
+{
+    const int d = w->particles->dimension;
+    dice r = {77};
+    size_t count = 0;
+    double *x = malloc((size_t)(side * side * side * 3) * sizeof *x);
+    for (int k = 0; k < (d == 3 ? side : 1); k++)
+        for (int j = 0; j < side; j++)
+            for (int i = 0; i < side; i++, count++) {
+                const int at[3] = {i, j, k};
+                for (int c = 0; c < d; c++)
+                    x[count * (size_t)d + (size_t)c] =
+                        (at[c] + dice_uniform(&r, -0.2, 0.2)) * spacing;
+            }
+    const ascc_const_array position = {.data = x, .scalar = ASCC_DOUBLE};
+    assert_int_equal(ascc_particles_clear(w->particles, ASCC_FLUID), ASCC_OK);
+    assert_int_equal(ascc_particles_add_fluid(w->particles, count, &position, NULL, NULL, NULL),
+                     ASCC_OK);
+    free(x);
+}
+
+static void the_estimate_of_scratch_is_within_a_factor_of_two(void **state)
+{
+    (void)state;
+    for (int variant = 0; variant < 4; variant++) {
+        test_memory c = {0};
+        const world_options o = counted(
+            &c, (world_options){.dimension = 2 + variant % 2, .random_network = variant > 1});
+        world w = open_world(&o);
+        set_block(&w, o.dimension == 2 ? 60 : 16);
+        const size_t count = ascc_particles_count(w.particles, ASCC_FLUID);
+        const size_t estimate = ascc_step_estimate(w.step, count, 0);
+        run(&w, no_gravity, 3);
+        const size_t held = statistics_of(&w).scratch_size;
+        print_message("%zu particles in %dD: %zu bytes of scratch, %zu estimated\n", count,
+                      o.dimension, held, estimate);
+        assert_true(estimate < 2 * held && held < 2 * estimate);
+        close_world(&w);
+    }
+}
+
+static void a_reserved_step_grows_once(void **state)
+{
+    (void)state;
+    test_memory c = {0};
+    const world_options o = counted(&c, (world_options){.dimension = 3, .random_network = true});
+    world w = open_world(&o);
+    set_block(&w, 12);
+    assert_int_equal(ascc_step_reserve(w.step, 4 * 12 * 12 * 12, 0), ASCC_OK);
+    const size_t before = c.calls;
+    run(&w, no_gravity, 1);
+    assert_int_equal(c.calls, before);
+    c.calls = 0;
+    c.fail_at = 1;
+    assert_int_equal(ascc_step_reserve(w.step, 1000000, 0), ASCC_ERROR_MEMORY);
+    c.fail_at = 0;
+    run(&w, no_gravity, 1);
+    close_world(&w);
+    assert_true(test_memory_is_clean(&c));
+}
+
 /* ---- What a step tells ---- */
 
 static void statistics_tell_what_happened(void **state)
@@ -832,6 +894,8 @@ int main(void)
         cmocka_unit_test(values_too_large_for_an_impulse_are_an_error),
         cmocka_unit_test(a_steady_step_allocates_nothing),
         cmocka_unit_test(each_failing_allocation_leaves_the_particles_as_they_were),
+        cmocka_unit_test(the_estimate_of_scratch_is_within_a_factor_of_two),
+        cmocka_unit_test(a_reserved_step_grows_once),
         cmocka_unit_test(statistics_tell_what_happened),
         cmocka_unit_test(measures_of_a_lattice_at_rest_are_those_of_rest),
     };

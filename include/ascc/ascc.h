@@ -414,6 +414,18 @@ ASCC_API ascc_status ascc_step_create(ascc_context *context, const ascc_model *m
                                       const ascc_step_options *options, ascc_step **step);
 ASCC_API void ascc_step_destroy(ascc_step **step);
 
+/**
+ * Bytes of scratch that a step of this many particles is expected to need, for a scene near rest
+ * density; within a factor of two for a compact one. 0 if step is none.
+ */
+ASCC_API size_t ascc_step_estimate(const ascc_step *step, size_t fluid, size_t boundary);
+
+/**
+ * Makes that much scratch at once, so that the first steps of such a scene need not grow it.
+ * errors: ARGUMENT, MEMORY; on error the step is as before.
+ */
+ASCC_API ascc_status ascc_step_reserve(ascc_step *step, size_t fluid, size_t boundary);
+
 /** What acts on the fluid from outside during ascc_step_run; NULL pointers are the defaults. */
 typedef struct ascc_forces {
     size_t size;           /* sizeof(ascc_forces) */
