@@ -264,7 +264,7 @@ static void droplets(report *r)
             }
         error = fmax(error, hypot(sum[0] - start[0], sum[1] - start[1]) / size);
     }
-    row(r, "two droplets, no gravity, change of momentum / sum of |m v|, worst of 0.5 s",
+    row(r, "two droplets, no gravity, change of momentum over the sum of its sizes, worst of 0.5 s",
         error < 1e-13, "rounding", "%.1e", error);
     sph_destroy(&s);
     recipe_free(&c);
