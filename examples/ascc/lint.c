@@ -13,7 +13,7 @@ static void usage(FILE *out)
         out,
         "usage: ascc lint [--speed X] [--clump X] [--worst X] FILE...\n\n"
         "Rejects sequences with values that are not finite, spikes, escapes or clumps.\n"
-        "  --speed X  times the speed that the fluid can reach (start and fall)   (default 4)\n"
+        "  --speed X  times the speed that the fluid can reach (start and fall)   (default 5)\n"
         "  --clump X  mean share of particles with two neighbours nearer than half a spacing\n"
         "             (default 0.005)\n"
         "  --worst X  the same share in the worst frame (default 0.05)\n"

@@ -248,7 +248,7 @@ ascc_status inspect(const inspect_input *input, const inspect_limits *limits, in
     if (limits)
         w.limits = *limits;
     if (w.limits.speed == 0.0)
-        w.limits.speed = 4.0;
+        w.limits.speed = 5.0;
     if (w.limits.clump == 0.0)
         w.limits.clump = 0.005;
     if (w.limits.worst == 0.0)

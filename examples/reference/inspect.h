@@ -22,7 +22,7 @@ typedef struct inspect_input {
 
 /* What a sequence may have at most; zero is the default. */
 typedef struct inspect_limits {
-    double speed; /* times what the fluid can reach from its start and by falling; 0 = 4 */
+    double speed; /* times what the fluid can reach from its start and by falling; 0 = 5 */
     double clump; /* mean share of particles in clumps; 0 = 0.005 */
     double worst; /* share in any one frame; 0 = 0.05 */
 } inspect_limits;

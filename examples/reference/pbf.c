@@ -130,7 +130,8 @@ static ascc_status reserve(pbf *p, size_t count)
 
 static void place(double (*to)[3], size_t count, int32_t d, const double *from)
 {
-    memset(to, 0, count * sizeof *to);
+    if (count)
+        memset(to, 0, count * sizeof *to);
     for (size_t i = 0; from && i < count; i++)
         memcpy(to[i], from + i * (size_t)d, (size_t)d * sizeof(double));
 }

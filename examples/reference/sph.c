@@ -30,8 +30,9 @@ struct sph {
     double (*shift)[3];            /* [fluid] */
     double *rate;                  /* [fluid] of the density */
     double mass, length, support, stiffness, normalisation, slope, spacing_weight;
-    double contact, push; /* distance below which pairs push each other, and the force, N */
-    bool ready;           /* accelerations belong to the positions */
+    double contact, wall_contact,
+        push;   /* distance below which pairs push each other, and the force, N */
+    bool ready; /* accelerations belong to the positions */
     sph_totals totals;
     ascc_message message;
 };
@@ -73,6 +74,8 @@ static void derive(sph *s)
     s->slope = -5.0 * s->normalisation / (h * h);
     s->spacing_weight = wendland(1.0 / o->smoothing);
     s->contact = o->contact * o->spacing;
+    /* four wall points in a square leave a hole 0.71 spacings from each */
+    s->wall_contact = o->dimension == 3 ? 1.25 * s->contact : s->contact;
     s->push = 0.5 * s->mass * o->sound_speed * o->sound_speed / o->spacing;
 }
 
@@ -145,13 +148,12 @@ static void place(const sph *s, sph_particle *p, size_t count, const double *pos
                   const double *velocity)
 {
     const size_t d = (size_t)s->options.dimension;
-    memset(p, 0, count * sizeof *p);
     for (size_t i = 0; i < count; i++) {
+        p[i] = (sph_particle){.density = s->options.rest_density};
         for (size_t c = 0; c < d; c++) {
             p[i].position[c] = position[i * d + c];
             p[i].velocity[c] = velocity ? velocity[i * d + c] : 0.0;
         }
-        p[i].density = s->options.rest_density;
     }
 }
 
@@ -164,7 +166,8 @@ ascc_status sph_set_fluid(sph *s, size_t count, const double *position, const do
         memmove(s->state + count, s->state + s->fluid, s->walls * sizeof *s->state);
     s->fluid = count;
     place(s, s->state, count, position, velocity);
-    memset(s->gradient, 0, s->capacity * sizeof *s->gradient);
+    if (s->capacity)
+        memset(s->gradient, 0, s->capacity * sizeof *s->gradient);
     s->totals = (sph_totals){0};
     s->ready = false;
     near_forget(s->lists);
@@ -178,7 +181,8 @@ ascc_status sph_set_walls(sph *s, size_t count, const double *position)
         return status;
     s->walls = count;
     place(s, s->state + s->fluid, count, position, NULL);
-    memset(s->gradient, 0, s->capacity * sizeof *s->gradient);
+    if (s->capacity)
+        memset(s->gradient, 0, s->capacity * sizeof *s->gradient);
     s->ready = false;
     near_forget(s->lists);
     return ASCC_OK;
@@ -388,8 +392,9 @@ INLINE double pair_force(const sph *s, const sph_particle *a, const sph_particle
         force +=
             2.0 * s->mass * s->mass / both * mu * (linear - o->impact_viscosity * mu) * p->slope;
     }
-    if (p->distance < s->contact && p->distance > 0.0) /* falls off to 0 at the contact distance */
-        force += s->push * (1.0 / p->distance - 1.0 / s->contact);
+    const double contact = wall ? s->wall_contact : s->contact;
+    if (p->distance < contact && p->distance > 0.0) /* falls off to 0 at the contact distance */
+        force += s->push * (1.0 / p->distance - 1.0 / contact);
     return force;
 }
 
