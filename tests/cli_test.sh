@@ -75,6 +75,9 @@ words='sim demo dam-break-2d --size 6'
     refuses 1 "/nowhere/p: No such file" $words -n 1 --ply /nowhere/p
     refuses 1 "/dev/null/f" $words -n 1 --frames /dev/null/f
     refuses 2 "usage: ascc info FILE" info
+    refuses 2 "usage: ascc show SEQUENCE" show
+    refuses 2 "usage: ascc show SEQUENCE" show none -o shown --every 0
+    refuses 1 "none: No such file" show none -o shown
     refuses 1 "No such file" info none
     refuses 1 "is no regular file" info .
     printf 'not a model' >text
@@ -114,6 +117,9 @@ holds 'point clouds have 28 bytes a particle behind their header' sh -c '
         head -n 3 $f | tail -n 1 | grep -q "element vertex 32" &&
             [ $(($(wc -c <$f) - header)) -eq $((32 * 28)) ] || exit 1
     done'
+
+run show a.safetensors -o shown --every 2
+holds 'show draws the frames it is asked for' sh -c '[ "$(ls shown | tr "\n" " ")" = "frame_00000.png frame_00002.png " ]'
 
 run sim demo dam-break-2d --size 8 -n 20 --every 10 -o b.safetensors --threads 3
 holds 'three threads write the same bytes as one' cmp a.safetensors b.safetensors

@@ -1,0 +1,107 @@
+/* ascc show: pictures of a sequence's frames. SPDX-License-Identifier: MIT */
+#include <errno.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+
+#include "commands.h"
+#include "picture.h"
+#include "progress.h"
+
+typedef struct options {
+    const char *sequence, *folder;
+    size_t every;
+} options;
+
+static int usage(FILE *to)
+{
+    fprintf(to, "usage: ascc show SEQUENCE -o DIR [--every K]\n\n"
+                "Writes every K-th frame (1) as a PNG picture.\n");
+    return to == stdout ? 0 : 2;
+}
+
+static bool read_arguments(options *o, int argc, char **argv)
+{
+    for (int i = 0; i < argc; i++) {
+        if (argv[i][0] != '-' && !o->sequence) {
+            o->sequence = argv[i];
+        } else if (strcmp(argv[i], "-o") == 0 && i + 1 < argc) {
+            o->folder = argv[++i];
+        } else if (strcmp(argv[i], "--every") == 0 && i + 1 < argc) {
+            char *end;
+            const long k = strtol(argv[++i], &end, 10);
+            if (*end || end == argv[i] || k < 1)
+                return false;
+            o->every = (size_t)k;
+        } else {
+            return false;
+        }
+    }
+    return o->sequence && o->folder;
+}
+
+/* Velocities of a frame: stored, or the difference to the frame before. */
+static void velocities(const ascc_sequence *s, size_t frame, float *v)
+{
+    const size_t n = s->count * (size_t)s->dimension;
+    if (frame == 0 || s->velocity_frames == s->frames) {
+        memcpy(v, s->velocity + frame * n, n * sizeof *v);
+        return;
+    }
+    for (size_t k = 0; k < n; k++)
+        v[k] = (float)(((double)s->position[frame * n + k] -
+                        (double)s->position[(frame - 1) * n + k]) /
+                       s->time_step);
+}
+
+static bool show(const options *o, const ascc_sequence *s, char *error, size_t capacity)
+{
+    if (mkdir(o->folder, 0777) != 0 && errno != EEXIST) {
+        (void)snprintf(error, capacity, "%s: %s", o->folder, strerror(errno));
+        return false;
+    }
+    const size_t n = s->count * (size_t)s->dimension;
+    float *v = malloc((n + 1) * sizeof *v);
+    if (!v) {
+        (void)snprintf(error, capacity, "no memory for %zu particles", s->count);
+        return false;
+    }
+    const ascc_view view = ascc_view_of(s);
+    ascc_progress progress;
+    ascc_progress_start(&progress, "drawing", (s->frames + o->every - 1) / o->every);
+    bool good = true;
+    for (size_t f = 0; good && f < s->frames; f += o->every) {
+        char path[600], text[96];
+        velocities(s, f, v);
+        (void)snprintf(path, sizeof path, "%s/frame_%05zu.png", o->folder, f);
+        (void)snprintf(text, sizeof text, "t = %.3f s   frame %zu   %zu particles",
+                       (double)f * s->time_step, f, s->count);
+        good = ascc_picture_write(path, &view, s->position + f * n, v, s->count, text, error,
+                                  capacity);
+        ascc_progress_add(&progress, 1);
+    }
+    ascc_progress_end(&progress);
+    free(v);
+    return good;
+}
+
+int ascc_command_show(int argc, char **argv)
+{
+    options o = {.every = 1};
+    if (argc == 1 && strcmp(argv[0], "--help") == 0)
+        return usage(stdout);
+    if (!read_arguments(&o, argc, argv))
+        return usage(stderr);
+    ascc_sequence s;
+    char error[768];
+    if (!ascc_sequence_read(o.sequence, &s, error, sizeof error)) {
+        fprintf(stderr, "ascc show: %s\n", error);
+        return 1;
+    }
+    const bool good = show(&o, &s, error, sizeof error);
+    if (!good)
+        fprintf(stderr, "ascc show: %s\n", error);
+    ascc_sequence_free(&s);
+    return good ? 0 : 1;
+}
