@@ -160,8 +160,9 @@ static ascc_status find_tensor(ascc_plan_builder *builder, const char *name, int
     if (*index < 0)
         return FAIL("tensor '%s' is missing", ascc_quote(name).text);
     const ascc_tensor *tensor = &builder->file->tensor[*index];
-    if (strcmp(tensor->type, "F32") != 0)
-        return FAIL("tensor '%s' is %s; weights must be F32", ascc_quote(name).text, tensor->type);
+    if (!ascc_tensor_is_float(tensor))
+        return FAIL("tensor '%s' is %s; weights must be F32, F16 or BF16", ascc_quote(name).text,
+                    tensor->type);
     if (tensor->rank != rank)
         return FAIL("tensor '%s' has %d dimensions, but must have %d", ascc_quote(name).text,
                     (int)tensor->rank, (int)rank);
