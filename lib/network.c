@@ -357,7 +357,7 @@ ascc_geometry ascc_network_geometry(const ascc_network_run *run, const ascc_rows
                                     const uint32_t *neighbor, size_t count, float *scratch,
                                     size_t room)
 {
-    ascc_geometry g = {{scratch, scratch + room, scratch + 2 * room, {NULL}}, NULL};
+    ascc_geometry g = {{scratch, scratch + room, scratch + 2 * room, {NULL}, NULL}, NULL};
     if (filter->window != ASCC_WINDOW_NONE)
         g.window = g.pairs.window[filter->window] = scratch + 3 * room;
     const ascc_points *s = rows->source, *q = rows->query;
