@@ -111,6 +111,8 @@ void model_builder_tensor(model_builder *builder, const char *name, int rank, co
     for (size_t i = 0; i < count; i++) {
         uint32_t bits;
         memcpy(&bits, &values[i], sizeof bits);
+        if (builder->coarse)
+            bits &= (bits & 0x7fffffffu) < 113u << 23 ? 0 : 0xffff0000u;
         const unsigned char bytes[4] = {(unsigned char)bits, (unsigned char)(bits >> 8),
                                         (unsigned char)(bits >> 16), (unsigned char)(bits >> 24)};
         const uint32_t half = half_of(bits);
@@ -185,12 +187,6 @@ static void add_random(model_builder *builder, uint64_t *state, const char *name
         abort();
     for (size_t i = 0; i < count; i++)
         values[i] = (float)(amplitude * ((double)(next_random(state) >> 11) * 0x1p-52 - 1.0));
-    for (size_t i = 0; builder->coarse && i < count; i++) {
-        uint32_t bits;
-        memcpy(&bits, &values[i], sizeof bits);
-        bits &= (bits & 0x7fffffffu) < 113u << 23 ? 0 : 0xffff0000u;
-        memcpy(&values[i], &bits, sizeof bits);
-    }
     model_builder_tensor(builder, name, rank, shape, values);
     free(values);
 }
@@ -484,7 +480,7 @@ unsigned char *model_builder_tiny(double spacing, size_t *size)
                               .levels = 2,
                               .spacing = spacing,
                               .gain = 1.0,
-                              .scale = 0.001,
+                              .scale = 1e-6,
                               .evaluate = "advected",
                               .method = "voxel_corners",
                               .window = "none",

@@ -29,7 +29,7 @@ const char *model_number(double value);
 typedef struct model_builder {
     model_text metadata, tensors, data;
     const char *type; /* of the tensors: "F32", "F16" or "BF16", which cut values; NULL = "F32" */
-    int coarse;       /* 1: random values are such that all three hold them */
+    int coarse;       /* 1: values are cut so that all three hold them */
 } model_builder;
 
 void model_builder_open(model_builder *builder);
