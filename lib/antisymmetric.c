@@ -16,6 +16,7 @@ typedef struct pair_job {
     const uint8_t *fluid; /* [set rows] 1 = a fluid particle */
     const double *mass;   /* [set rows] 0 for walls */
     int64_t *sum;         /* [set rows][dimension] */
+    float *share;         /* [set rows][8]: what each row gives each bump of a basis, else NULL */
     size_t chunk, phase;
     atomic_uint_least64_t pairs;
     atomic_uint_least64_t bad_row; /* 1 + smallest set row with a value that cannot be held */
@@ -26,7 +27,8 @@ typedef struct batch {
     size_t count;
     uint32_t neighbor[BATCH];
     float geometry[ASCC_GEOMETRY_ARRAYS * BATCH];
-    float term[BATCH][4];
+    float term[BATCH][4];  /* of a grid: a vector for each pair */
+    float strength[BATCH]; /* of a basis: along the line from the row to the neighbour */
 } batch;
 
 /* Mass that turns a velocity correction into an impulse: the particles' own if they agree, else twice
@@ -50,25 +52,41 @@ static void note_bad_row(pair_job *job, size_t row)
         ;
 }
 
-/* The impulse on row i from one neighbour in quanta, before rounding. */
-static void impulse_of(const pair_job *job, size_t i, uint32_t j, const float term[4],
-                       double impulse[3])
+/* Displacement from row i to a neighbour in units, and its square. */
+static double displacement(const pair_job *job, size_t i, size_t j, double d[3])
+{
+    double square = 0.0;
+    for (int c = 0; c < 3; c++) {
+        d[c] = (double)(int32_t)((uint32_t)job->rows->source->low[c][j] -
+                                 (uint32_t)job->rows->query->low[c][i]);
+        square += d[c] * d[c];
+    }
+    return square;
+}
+
+/* The impulse on row i from neighbour k of the batch in quanta, before rounding. */
+static void impulse_of(const pair_job *job, size_t i, const batch *b, size_t k, double impulse[3])
 {
     const ascc_plan *plan = job->run->network->plan;
+    const size_t j = b->neighbor[k];
     const double mass = pair_mass(job->mass[i], job->mass[j]);
-    double t[3] = {0.0, 0.0, 0.0};
-    for (int c = 0; c < plan->dimension; c++)
-        t[c] = (double)term[c] * job->scale->factor[c];
-    if (plan->output.radial) {
-        double d[3], square = 0.0, along = 0.0;
-        for (int c = 0; c < 3; c++) {
-            d[c] = (double)(int32_t)((uint32_t)job->rows->source->low[c][j] -
-                                     (uint32_t)job->rows->query->low[c][i]);
-            square += d[c] * d[c];
-            along += d[c] * t[c];
-        }
+    double t[3] = {0.0, 0.0, 0.0}, d[3];
+    if (job->share) {
+        const double length = sqrt(displacement(job, i, j, d));
+        const double strength = (double)b->strength[k] * job->scale->factor[0];
         for (int c = 0; c < 3; c++)
-            t[c] = along / square * d[c];
+            t[c] = strength / length * d[c];
+    } else {
+        for (int c = 0; c < plan->dimension; c++)
+            t[c] = (double)b->term[k][c] * job->scale->factor[c];
+        if (plan->output.radial) {
+            const double square = displacement(job, i, j, d);
+            double along = 0.0;
+            for (int c = 0; c < 3; c++)
+                along += d[c] * t[c];
+            for (int c = 0; c < 3; c++)
+                t[c] = along / square * d[c];
+        }
     }
     for (int c = 0; c < 3; c++)
         impulse[c] = t[c] * mass;
@@ -82,22 +100,35 @@ static const float *output_values(const ascc_network_run *run)
     return output->rectify ? value->rectified : value->raw;
 }
 
-static void flush(pair_job *job, size_t i, batch *b)
+/* What the kernel gives for each pair of the batch. */
+static void evaluate_kernel(const pair_job *job, size_t i, batch *b)
 {
     const ascc_network_run *run = job->run;
+    const ascc_kernels *kernels = run->tools->kernels;
     const ascc_plan *plan = run->network->plan;
+    const ascc_filter *filter = &plan->output.filter;
     const size_t d = (size_t)plan->dimension, a = ascc_padded(plan->output.inputs);
     const float *value = output_values(run);
-    const ascc_filter *filter = &plan->output.filter;
     const ascc_geometry g =
         ascc_network_geometry(run, job->rows, filter, i, b->neighbor, b->count, b->geometry, BATCH);
-    run->tools->kernels->pair_terms(&g.pairs, g.window, b->neighbor, b->count, value + i * a, value,
-                                    a, filter->cells, run->network->term_weight[plan->term_count],
-                                    d, b->term[0]);
+    if (job->share)
+        kernels->pair_strengths(g.pairs.distance, b->neighbor, b->count,
+                                job->share + i * ASCC_MAX_BUMPS, job->share, (size_t)filter->bumps,
+                                b->strength);
+    else
+        kernels->pair_terms(&g.pairs, g.window, b->neighbor, b->count, value + i * a, value, a,
+                            filter->cells, run->network->term_weight[plan->term_count], d,
+                            b->term[0]);
+}
+
+static void flush(pair_job *job, size_t i, batch *b)
+{
+    const size_t d = (size_t)job->run->network->plan->dimension;
+    evaluate_kernel(job, i, b);
     for (size_t k = 0; k < b->count; k++) {
         const size_t j = b->neighbor[k];
         double impulse[3];
-        impulse_of(job, i, b->neighbor[k], b->term[k], impulse);
+        impulse_of(job, i, b, k, impulse);
         for (size_t c = 0; c < d; c++) {
             if (!(fabs(impulse[c]) < ASCC_IMPULSE_LIMIT)) {
                 note_bad_row(job, i);
@@ -144,6 +175,28 @@ static void evaluate_chunks(void *data, size_t begin, size_t end, int32_t slot)
         for (size_t i = first; i < ascc_min_size(first + job->chunk, count); i++)
             if (job->fluid[i])
                 evaluate_row(job, i, &b);
+    }
+}
+
+/* Shares of the rows that are active, stretch by stretch. */
+static void compute_shares(void *data, size_t begin, size_t end, int32_t slot)
+{
+    (void)slot;
+    const pair_job *job = data;
+    const ascc_network_run *run = job->run;
+    const ascc_plan *plan = run->network->plan;
+    const size_t a = ascc_padded(plan->output.inputs);
+    const uint8_t *active = run->value[plan->output.source].active;
+    const float *value = output_values(run);
+    memset(job->share + begin * ASCC_MAX_BUMPS, 0,
+           (end - begin) * ASCC_MAX_BUMPS * sizeof *job->share);
+    for (size_t i = begin, stop; i < end; i = stop) {
+        for (stop = i + 1; stop < end && active[i] && active[stop];)
+            stop++;
+        if (active[i])
+            run->tools->kernels->multiply(
+                value + i * a, a, stop - i, a, run->network->term_weight[plan->term_count],
+                ASCC_MAX_BUMPS, job->share + i * ASCC_MAX_BUMPS, ASCC_MAX_BUMPS);
     }
 }
 
@@ -198,7 +251,10 @@ static ascc_status take_job(pair_job *job, int32_t set, const ascc_impulse_scale
     uint8_t *fluid = ascc_arena_take(arena, count, 1);
     double *mass = ascc_arena_take(arena, count, sizeof *mass);
     job->sum = ascc_arena_take(arena, count, d * sizeof(int64_t));
-    if (!fluid || !mass || !job->sum)
+    const bool basis = job->run->network->plan->output.filter.bumps > 0;
+    if (basis)
+        job->share = ascc_arena_take(arena, count, ASCC_MAX_BUMPS * sizeof *job->share);
+    if (!fluid || !mass || !job->sum || (basis && !job->share))
         return ascc_fail(job->run->tools->message, ASCC_ERROR_MEMORY, "no memory for the impulses");
     memset(job->sum, 0, count * d * sizeof(int64_t));
     for (size_t i = 0; i < count; i++) {
@@ -225,6 +281,8 @@ ascc_status ascc_antisymmetric_impulses(const ascc_network_run *run,
     const ascc_status status = take_job(&job, set, scale);
     if (status != ASCC_OK)
         return status;
+    if (job.share)
+        ascc_workers_run(run->tools->workers, count, 1024, compute_shares, &job);
     job.chunk = ascc_max_size(reach_of(&job), SMALLEST_CHUNK);
     const size_t chunks = (count + job.chunk - 1) / job.chunk;
     for (job.phase = 0; job.phase < 3 && job.phase < chunks; job.phase++)

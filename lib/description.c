@@ -13,7 +13,7 @@ static const char *const evaluations[] = {"current", "advected", "advected_mean"
 static const char *const features[] = {"one", "velocity", "normal"};
 static const char *const samplings[] = {"voxel_centers", "voxel_corners", "farthest"};
 static const char *const anchors[] = {"world", "centroid"};
-static const char *const term_kinds[] = {"convolution", "dense", "identity"};
+static const char *const term_kinds[] = {"convolution", "dense", "identity", "transfer"};
 static const char *const output_kinds[] = {"plain", "antisymmetric"};
 static const char *const projections[] = {"none", "radial"};
 static const char *const storages[] = {"half", "full"};
@@ -151,13 +151,23 @@ static int32_t read_source(ascc_plan_builder *builder, ascc_reader *reader, uint
     return source;
 }
 
-static void read_filter(ascc_reader *reader, uint32_t object, ascc_filter *filter)
+/* The kernel of a filter: a grid with window and mapping, or a basis. Harmonics have an order only
+ * where the kernel is not central. */
+static void read_filter(ascc_reader *reader, uint32_t object, ascc_filter *filter, bool central)
 {
     filter->radius = ascc_reader_number(reader, object, "radius", ASCC_PLAN_MIN, ASCC_PLAN_MAX);
-    filter->window =
-        (ascc_window)ascc_reader_choice(reader, object, "window", windows, COUNT(windows));
-    filter->mapping =
-        (ascc_mapping)ascc_reader_choice(reader, object, "mapping", mappings, COUNT(mappings));
+    if (ascc_reader_has(reader, object, "basis")) {
+        const uint32_t basis = ascc_reader_object(reader, object, "basis");
+        filter->bumps = ascc_reader_integer(reader, basis, "bumps", 1, ASCC_MAX_BUMPS);
+        if (!central)
+            filter->order = ascc_reader_integer(reader, basis, "order", 0, ASCC_MAX_ORDER);
+        ascc_reader_end(reader, basis);
+    } else {
+        filter->window =
+            (ascc_window)ascc_reader_choice(reader, object, "window", windows, COUNT(windows));
+        filter->mapping =
+            (ascc_mapping)ascc_reader_choice(reader, object, "mapping", mappings, COUNT(mappings));
+    }
     filter->neighbor_limit = optional_integer(reader, object, "neighbor_limit");
 }
 
@@ -171,11 +181,13 @@ static void read_term(ascc_plan_builder *builder, ascc_reader *reader, uint32_t 
     term.column = optional_integer(reader, object, "column");
     if (term.kind == ASCC_TERM_CONVOLUTION) {
         weight = ascc_reader_text(reader, object, "kernel");
-        read_filter(reader, object, &term.filter);
+        read_filter(reader, object, &term.filter, false);
         term.filter.skip_self = optional_flag(reader, object, "skip_self");
-    } else if (term.kind == ASCC_TERM_DENSE) {
+    } else if (term.kind != ASCC_TERM_IDENTITY) {
         weight = ascc_reader_text(reader, object, "weight");
     }
+    if (term.kind == ASCC_TERM_TRANSFER)
+        term.normalize = optional_flag(reader, object, "normalize");
     if (weight && ascc_reader_has(reader, object, "bias"))
         bias = ascc_reader_text(reader, object, "bias");
     ascc_reader_end(reader, object);
@@ -256,7 +268,9 @@ static void read_output(ascc_plan_builder *builder, ascc_reader *reader)
     read_scale(reader, object, builder->plan.dimension, output.scale);
     if (output.kind == ASCC_OUTPUT_ANTISYMMETRIC) {
         weight = ascc_reader_text(reader, object, "kernel");
-        read_filter(reader, object, &output.filter);
+        read_filter(reader, object, &output.filter, true);
+    }
+    if (output.kind == ASCC_OUTPUT_ANTISYMMETRIC && !output.filter.bumps) {
         output.radial =
             ascc_reader_choice(reader, object, "projection", projections, COUNT(projections));
         if (ascc_reader_choice(reader, object, "stored", storages, COUNT(storages)) == 0)

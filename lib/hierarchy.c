@@ -14,7 +14,7 @@ void ascc_plan_radii(const ascc_plan *plan, double *smallest, double *largest)
     for (int32_t t = 0; t <= plan->term_count; t++) {
         const bool last = t == plan->term_count;
         if (last ? plan->output.kind != ASCC_OUTPUT_ANTISYMMETRIC
-                 : plan->term[t].kind != ASCC_TERM_CONVOLUTION)
+                 : !ascc_term_searches(&plan->term[t]))
             continue;
         const double radius = last ? plan->output.filter.radius : plan->term[t].filter.radius;
         *smallest = radius < *smallest ? radius : *smallest;

@@ -16,26 +16,36 @@
 #define ASCC_MAX_LEVELS 8
 #define ASCC_MAX_CHANNELS 1024
 #define ASCC_MAX_CELLS 4096 /* of one kernel */
+#define ASCC_MAX_BUMPS 8
+#define ASCC_MAX_ORDER 2
 
 /* Point sets. Level 0 is fluid + boundary; set ASCC_SET_LEVEL + l - 1 is level l >= 1. */
 enum { ASCC_SET_FLUID = 0, ASCC_SET_BOUNDARY = 1, ASCC_SET_ALL = 2, ASCC_SET_LEVEL = 3 };
 #define ASCC_MAX_SETS (ASCC_SET_LEVEL + ASCC_MAX_LEVELS - 1)
 
-typedef enum ascc_window { ASCC_WINDOW_NONE, ASCC_WINDOW_POLY6, ASCC_WINDOW_PEAK } ascc_window;
+typedef enum ascc_window {
+    ASCC_WINDOW_NONE,
+    ASCC_WINDOW_POLY6,
+    ASCC_WINDOW_PEAK,
+    ASCC_WINDOW_HAT, /* of a transfer: trilinear within a cube */
+} ascc_window;
 
 typedef enum ascc_mapping {
-    ASCC_MAPPING_IDENTITY, /* the ball's bounding cube */
-    ASCC_MAPPING_RADIAL,   /* r scaled so that the ball fills the cube */
-    ASCC_MAPPING_VOLUME,   /* volume preserving (SEMANTICS 2) */
+    ASCC_MAPPING_IDENTITY,  /* the ball's bounding cube */
+    ASCC_MAPPING_RADIAL,    /* r scaled so that the ball fills the cube */
+    ASCC_MAPPING_VOLUME,    /* volume preserving (SEMANTICS 2) */
+    ASCC_MAPPING_DIRECTION, /* of a basis: unit vector and distance */
 } ascc_mapping;
 
 /* How a convolution looks around a point. */
 typedef struct ascc_filter {
-    int32_t cells[3];       /* of the kernel along x, y, z; 2D: z = 1 */
+    /* Of a grid: along x, y, z; 2D: z = 1. Of a basis: harmonics, bumps, 1. */
+    int32_t cells[3];
     int32_t neighbor_limit; /* mutual where source and query are one set; 0 = none */
     ascc_window window;
     ascc_mapping mapping;
-    int32_t skip_self; /* a point with the query's very position is no neighbour */
+    int32_t skip_self;    /* a point with the query's very position is no neighbour */
+    int32_t bumps, order; /* of a basis in place of a grid, else 0 */
     int32_t reserved;
     double radius; /* m */
 } ascc_filter;
@@ -44,6 +54,7 @@ typedef enum ascc_term_kind {
     ASCC_TERM_CONVOLUTION,
     ASCC_TERM_DENSE,    /* on the rows that source set and layer set share */
     ASCC_TERM_IDENTITY, /* residual: likewise, without weights */
+    ASCC_TERM_TRANSFER, /* between scales: trilinear hats as wide as the coarser one's voxels */
 } ascc_term_kind;
 
 typedef struct ascc_term {
@@ -53,12 +64,22 @@ typedef struct ascc_term {
     int32_t column;  /* first column of the layer it adds to */
     int32_t inputs;  /* channels of the source */
     int32_t outputs; /* columns it adds to; column + outputs <= layer's channels */
-    const float
-        *weight; /* convolution [z][y][x][inputs][outputs], dense [inputs][outputs], else NULL */
+    const float *
+        weight; /* convolution [z][y][x][inputs][outputs] or, with a basis, [bump][harmonic][inputs]
+                    [outputs]; dense, transfer [inputs][outputs]; else NULL */
     const float
         *bias; /* [outputs] or NULL; added to every row the term reaches, also without neighbours */
-    ascc_filter filter; /* of a convolution */
+    int32_t normalize; /* of a transfer: hats are divided by their sum */
+    int32_t reserved;
+    double voxel;       /* of a transfer, m: hats are 0 this far away along any axis */
+    ascc_filter filter; /* of a convolution or transfer */
 } ascc_term;
+
+/* The term reads neighbours, not rows of its own. */
+static inline bool ascc_term_searches(const ascc_term *term)
+{
+    return term->kind == ASCC_TERM_CONVOLUTION || term->kind == ASCC_TERM_TRANSFER;
+}
 
 typedef struct ascc_layer {
     char name[32];
@@ -80,8 +101,10 @@ typedef struct ascc_output {
     int32_t radial; /* pair terms projected on the line between the particles */
     int32_t reserved;
     ascc_filter filter;
-    const float *weight; /* antisymmetric: the whole kernel [z][y][x][inputs][dimension] */
-    double scale[3];     /* metres of position correction in one time step per unit of output */
+    /* antisymmetric: the whole kernel [z][y][x][inputs][dimension]; with a basis [bump][inputs], whose
+     * pair terms lie on the line between the particles by themselves */
+    const float *weight;
+    double scale[3]; /* metres of position correction in one time step per unit of output */
 } ascc_output;
 
 typedef enum ascc_feature {

@@ -470,6 +470,17 @@ static size_t keep_nearest(const ascc_rows *rows, const int32_t at[3], uint32_t 
     return kept;
 }
 
+/* The hat of the box is above 0 here: the same bits as the geometry kernel's. */
+static bool within_box(const ascc_rows *rows, uint32_t row, const int32_t at[3])
+{
+    for (int c = 0; c < 3; c++) {
+        const int32_t d = (int32_t)((uint32_t)rows->source->low[c][row] - (uint32_t)at[c]);
+        if (!(fabsf((float)d * rows->inverse_box) < 1.0f))
+            return false;
+    }
+    return true;
+}
+
 /* Appends the neighbours of one query within a run of slots; false when there are too many. */
 static bool search_run(const rows_job *job, size_t begin, size_t end, const int32_t at[3],
                        uint32_t query, uint32_t *found, size_t *count, distance *heap)
@@ -488,6 +499,8 @@ static bool search_run(const rows_job *job, size_t begin, size_t end, const int3
             const uint32_t row = grid->order ? grid->order[fresh[k]] : fresh[k];
             if (rows->skip_self && rows->source->low[0][row] == at[0] &&
                 rows->source->low[1][row] == at[1] && rows->source->low[2][row] == at[2])
+                continue;
+            if (rows->inverse_box > 0.0f && !within_box(rows, row, at))
                 continue;
             fresh[kept++] = row;
         }

@@ -96,7 +96,8 @@ typedef struct ascc_rows {
     double radius; /* units */
     bool same;     /* query and source are one set */
     bool skip_self;
-    int32_t limit;         /* nearest neighbours kept, mutual if `same`; 0 = all */
+    float inverse_box; /* one over half a cube's edge, whose inside alone counts; 0 = the ball */
+    int32_t limit;     /* nearest neighbours kept, mutual if `same`; 0 = all */
     int32_t max_neighbors; /* before LIMIT */
     uint32_t *count;       /* [query count]; ASCC_ROW_ABSENT = not made */
     size_t *start;         /* [query count] into neighbor */

@@ -33,18 +33,19 @@ static size_t cell_count(const ascc_filter *filter)
 /* ---- Prepared once ---- */
 
 static int32_t find_key(ascc_network *network, int32_t query, int32_t source,
-                        const ascc_filter *filter, bool skip_self)
+                        const ascc_filter *filter, bool skip_self, double box)
 {
     ascc_rows_key wanted = {.query = query,
                             .source = source,
                             .skip_self = skip_self,
                             .limit = filter->neighbor_limit,
-                            .radius = filter->radius};
+                            .radius = filter->radius,
+                            .box = box};
     int32_t k = 0;
     for (; k < network->key_count; k++) {
         const ascc_rows_key *key = &network->key[k];
         if (key->query == query && key->source == source && key->skip_self == wanted.skip_self &&
-            key->limit == wanted.limit && key->radius == wanted.radius)
+            key->limit == wanted.limit && key->radius == wanted.radius && key->box == box)
             break;
     }
     if (k == network->key_count)
@@ -54,11 +55,12 @@ static int32_t find_key(ascc_network *network, int32_t query, int32_t source,
 
 static size_t arranged_size(const ascc_plan *plan, int32_t t)
 {
+    const ascc_output *output = &plan->output;
     if (t == plan->term_count)
-        return plan->output.kind != ASCC_OUTPUT_ANTISYMMETRIC
-                   ? 0
-                   : cell_count(&plan->output.filter) * (size_t)plan->dimension *
-                         ascc_padded(plan->output.inputs);
+        return output->kind != ASCC_OUTPUT_ANTISYMMETRIC ? 0
+               : output->filter.bumps ? ASCC_MAX_BUMPS * ascc_padded(output->inputs)
+                                      : cell_count(&output->filter) * (size_t)plan->dimension *
+                                            ascc_padded(output->inputs);
     const ascc_term *term = &plan->term[t];
     if (term->kind == ASCC_TERM_IDENTITY)
         return 0;
@@ -75,6 +77,13 @@ static void arrange(const ascc_plan *plan, int32_t t, float *to)
     const size_t a = (size_t)(last ? plan->output.inputs : term->inputs);
     const size_t b = (size_t)(last ? plan->dimension : term->outputs);
     const size_t a8 = ascc_padded((int32_t)a), b8 = last ? b : ascc_padded((int32_t)b);
+    if (last && plan->output.filter.bumps) {
+        memset(to, 0, a8 * ASCC_MAX_BUMPS * sizeof *to);
+        for (size_t k = 0; k < (size_t)plan->output.filter.bumps; k++)
+            for (size_t i = 0; i < a; i++)
+                to[i * ASCC_MAX_BUMPS + k] = from[k * a + i];
+        return;
+    }
     const size_t cells = arranged_size(plan, t) / (a8 * b8);
     memset(to, 0, cells * a8 * b8 * sizeof *to);
     for (size_t c = 0; c < cells; c++)
@@ -129,16 +138,17 @@ ascc_status ascc_network_create(ascc_network *network, const ascc_allocator *all
             const ascc_term *term = &plan->term[t];
             network->wants[term->source] |= term->rectify ? WANTS_RECTIFIED : WANTS_RAW;
             network->term_key[t] =
-                term->kind != ASCC_TERM_CONVOLUTION
+                !ascc_term_searches(term)
                     ? -1
                     : find_key(network, plan->layer[l].set, ascc_network_set(network, term->source),
-                               &term->filter, term->filter.skip_self);
+                               &term->filter, term->filter.skip_self, term->voxel);
         }
     network->wants[output->source] |= output->rectify ? WANTS_RECTIFIED : WANTS_RAW;
     network->term_key[plan->term_count] = -1;
     if (antisymmetric) {
         const int32_t set = ascc_network_set(network, output->source);
-        network->term_key[plan->term_count] = find_key(network, set, set, &output->filter, false);
+        network->term_key[plan->term_count] =
+            find_key(network, set, set, &output->filter, false, 0.0);
     }
     return ASCC_OK;
 }
@@ -173,6 +183,7 @@ static ascc_status open_rows(ascc_network_run *run)
         rows->same = key->query == key->source;
         rows->skip_self = key->skip_self;
         rows->limit = key->limit;
+        rows->inverse_box = key->box > 0.0 ? (float)(1.0 / (key->box * h->scale.inverse)) : 0.0f;
         rows->max_neighbors = network->max_neighbors;
         ascc_status status =
             ascc_hierarchy_grid(h, run->tools, key->query, rows->radius, &rows->query_grid);
@@ -357,14 +368,17 @@ ascc_geometry ascc_network_geometry(const ascc_network_run *run, const ascc_rows
                                     const uint32_t *neighbor, size_t count, float *scratch,
                                     size_t room)
 {
-    ascc_geometry g = {{scratch, scratch + room, scratch + 2 * room, {NULL}}, NULL};
+    ascc_geometry g = {{scratch, scratch + room, scratch + 2 * room, {NULL}, NULL}, NULL};
     if (filter->window != ASCC_WINDOW_NONE)
         g.window = g.pairs.window[filter->window] = scratch + 3 * room;
+    else if (filter->mapping == ASCC_MAPPING_DIRECTION)
+        g.pairs.distance = scratch + 3 * room;
+    const float inverse =
+        rows->inverse_box > 0.0f ? rows->inverse_box : (float)(1.0 / rows->radius);
     const ascc_points *s = rows->source, *q = rows->query;
     const ascc_coordinates source = {s->low[0], s->low[1], s->low[2]};
     run->tools->kernels->geometry(&source, neighbor, count, q->low[0][query], q->low[1][query],
-                                  q->low[2][query], (float)(1.0 / rows->radius),
-                                  (int)filter->mapping, &g.pairs);
+                                  q->low[2][query], inverse, (int)filter->mapping, &g.pairs);
     return g;
 }
 
@@ -374,6 +388,43 @@ static void add_bias(const ascc_term *term, float *row)
         row[c] += term->bias[c];
 }
 
+/* Hats become shares of their sum. */
+static void normalize_hats(float *hat, size_t count)
+{
+    float sum = 0.0f;
+    for (size_t k = 0; k < count; k++)
+        sum += hat[k];
+    for (size_t k = 0; k < count; k++)
+        hat[k] /= sum;
+}
+
+/* What a term reads around one row: [cell][inputs]. */
+static void fill_column(const layer_job *job, const ascc_term *term, const ascc_rows *rows,
+                        size_t row, float *column, float *scratch)
+{
+    const ascc_kernels *kernels = job->run->tools->kernels;
+    const ascc_filter *filter = &term->filter;
+    const size_t a = ascc_padded(term->inputs), count = rows->count[row];
+    const uint32_t *neighbor = rows->neighbor + rows->start[row];
+    const float *feature = source_values(job->run, term);
+    const ascc_geometry g =
+        ascc_network_geometry(job->run, rows, filter, row, neighbor, count, scratch, job->room);
+    if (term->kind == ASCC_TERM_TRANSFER) {
+        float *hat = g.pairs.window[ASCC_WINDOW_HAT];
+        if (term->normalize)
+            normalize_hats(hat, count);
+        kernels->gather_basis(hat, job->room, 1, 1, neighbor, count, feature, a, column);
+    } else if (filter->bumps) {
+        float *factor = scratch + ASCC_GEOMETRY_ARRAYS * job->room;
+        const size_t harmonics = (size_t)filter->cells[0], bumps = (size_t)filter->bumps;
+        kernels->basis(&g.pairs, count, bumps, harmonics, factor, job->room);
+        kernels->gather_basis(factor, job->room, bumps, harmonics, neighbor, count, feature, a,
+                              column);
+    } else {
+        kernels->gather(&g.pairs, g.window, neighbor, count, feature, a, filter->cells, column);
+    }
+}
+
 static void convolve_tile(const layer_job *job, const ascc_term *term, const ascc_rows *rows,
                           const uint32_t *list, size_t n, float *column, float *tile,
                           float *geometry)
@@ -381,14 +432,8 @@ static void convolve_tile(const layer_job *job, const ascc_term *term, const asc
     const ascc_kernels *kernels = job->run->tools->kernels;
     const size_t a = ascc_padded(term->inputs), width = job->width;
     const size_t length = cell_count(&term->filter) * a, stride = length + COLUMN_PADDING;
-    const float *feature = source_values(job->run, term);
     for (size_t r = 0; r < n; r++) {
-        const uint32_t *neighbor = rows->neighbor + rows->start[list[r]];
-        const size_t count = rows->count[list[r]];
-        const ascc_geometry g = ascc_network_geometry(job->run, rows, &term->filter, list[r],
-                                                      neighbor, count, geometry, job->room);
-        kernels->gather(&g.pairs, g.window, neighbor, count, feature, a, term->filter.cells,
-                        column + r * stride);
+        fill_column(job, term, rows, list[r], column + r * stride, geometry);
         add_bias(term, tile + r * width + term->column);
     }
     kernels->multiply(column, stride, n, length,
@@ -496,19 +541,23 @@ static ascc_status compute_layer(ascc_network_run *run, int32_t l, uint32_t *lis
     const ascc_plan *plan = run->network->plan;
     const ascc_layer *layer = &plan->layer[l];
     const ascc_search_tools *tools = run->tools;
-    size_t longest = 0;
-    for (int32_t t = layer->first_term; t < layer->first_term + layer->term_count; t++)
-        if (plan->term[t].kind == ASCC_TERM_CONVOLUTION)
-            longest = ascc_max_size(longest, cell_count(&plan->term[t].filter) *
-                                                     ascc_padded(plan->term[t].inputs) +
-                                                 COLUMN_PADDING);
+    size_t longest = 0, members = 0;
+    for (int32_t t = layer->first_term; t < layer->first_term + layer->term_count; t++) {
+        const ascc_term *term = &plan->term[t];
+        if (!ascc_term_searches(term))
+            continue;
+        const size_t cells = cell_count(&term->filter);
+        longest = ascc_max_size(longest, cells * ascc_padded(term->inputs) + COLUMN_PADDING);
+        if (term->filter.bumps)
+            members = ascc_max_size(members, cells);
+    }
     layer_job job = {.run = run, .layer = layer, .value = &run->value[l + 2], .list = list};
     const size_t slots = (size_t)ascc_workers_count(tools->workers);
     job.width = ascc_padded(layer->channels) + 8;
     job.tile_offset = TILE_ROWS * longest;
     job.room = ((size_t)run->longest + 15) / 8 * 8;
     job.geometry_offset = job.tile_offset + TILE_ROWS * job.width;
-    job.scratch_size = job.geometry_offset + ASCC_GEOMETRY_ARRAYS * job.room;
+    job.scratch_size = job.geometry_offset + (ASCC_GEOMETRY_ARRAYS + members) * job.room;
     job.scratch = ascc_arena_take(tools->arena, slots * job.scratch_size, sizeof(float));
     if (!job.scratch || !take_value(run, l + 2))
         return ascc_fail(tools->message, ASCC_ERROR_MEMORY, "no memory for layer %s", layer->name);

@@ -15,6 +15,7 @@ typedef struct ascc_rows_key {
     int32_t query, source; /* sets */
     int32_t skip_self, limit;
     double radius;   /* m */
+    double box;      /* m: a transfer's voxel; 0 = the whole ball */
     size_t expected; /* neighbours, from the last step */
 } ascc_rows_key;
 
@@ -28,7 +29,8 @@ typedef struct ascc_network {
     int32_t *term_key;  /* [term_count + 1], last: the output; -1 = none */
     uint8_t *wants;     /* [value_count] WANTS_* */
     /* Weights as the kernels read them, channels filled up to multiples of 8: convolutions
-     * [cell][inputs][outputs], dense [inputs][outputs], an antisymmetric output [cell][dimension][inputs] */
+     * [cell][inputs][outputs], dense [inputs][outputs], an antisymmetric output [cell][dimension][inputs] or,
+     * with a basis, [inputs][8 bumps] */
     float *weights;
     size_t weight_count;
     const float **term_weight; /* [term_count + 1] */
@@ -66,7 +68,7 @@ typedef struct ascc_network_run {
     uint32_t longest;
 } ascc_network_run;
 
-/* Geometry of up to `room` pairs in scratch, for one filter. */
+/* Geometry of up to `room` pairs in scratch, for one filter: scaled to its radius, or to its box. */
 typedef struct ascc_geometry {
     ascc_pairs pairs;
     const float *window; /* NULL = 1 */

@@ -160,8 +160,9 @@ static ascc_status find_tensor(ascc_plan_builder *builder, const char *name, int
     if (*index < 0)
         return FAIL("tensor '%s' is missing", ascc_quote(name).text);
     const ascc_tensor *tensor = &builder->file->tensor[*index];
-    if (strcmp(tensor->type, "F32") != 0)
-        return FAIL("tensor '%s' is %s; weights must be F32", ascc_quote(name).text, tensor->type);
+    if (!ascc_tensor_is_float(tensor))
+        return FAIL("tensor '%s' is %s; weights must be F32, F16 or BF16", ascc_quote(name).text,
+                    tensor->type);
     if (tensor->rank != rank)
         return FAIL("tensor '%s' has %d dimensions, but must have %d", ascc_quote(name).text,
                     (int)tensor->rank, (int)rank);
@@ -210,6 +211,32 @@ static ascc_status check_filter(ascc_plan_builder *builder, const ascc_filter *f
         return FAIL("%s: 'radius' must be a positive length", name);
     if (filter->neighbor_limit < 0)
         return FAIL("%s: the neighbour limit is negative", name);
+    if (filter->bumps < 0 || filter->bumps > ASCC_MAX_BUMPS)
+        return FAIL("%s: 'bumps' must be within 1 and %d", name, ASCC_MAX_BUMPS);
+    if (filter->order < 0 || filter->order > ASCC_MAX_ORDER)
+        return FAIL("%s: 'order' must be within 0 and %d", name, ASCC_MAX_ORDER);
+    return ASCC_OK;
+}
+
+/* Harmonics of all orders up to this one. */
+static int32_t harmonic_count(int32_t order, int32_t dimension)
+{
+    return dimension == 2 ? 2 * order + 1 : (order + 1) * (order + 1);
+}
+
+/* Checks a basis against its tensor [bump][harmonic][in][out] and makes it cells. */
+static ascc_status check_basis(ascc_plan_builder *builder, const ascc_tensor *tensor,
+                               ascc_filter *filter)
+{
+    const int32_t harmonics = harmonic_count(filter->order, builder->plan.dimension);
+    if (tensor->shape[0] != (size_t)filter->bumps || tensor->shape[1] != (size_t)harmonics)
+        return FAIL("tensor '%s' is for %zu bumps and %zu harmonics, but its basis has %d and %d",
+                    ascc_quote(tensor->name).text, tensor->shape[0], tensor->shape[1],
+                    (int)filter->bumps, (int)harmonics);
+    const int32_t cells[3] = {harmonics, filter->bumps, 1};
+    memcpy(filter->cells, cells, sizeof cells);
+    filter->mapping = ASCC_MAPPING_DIRECTION;
+    filter->window = ASCC_WINDOW_NONE;
     return ASCC_OK;
 }
 
@@ -251,6 +278,31 @@ ascc_status ascc_plan_add_layer(ascc_plan_builder *builder, const char *name, in
     return ASCC_OK;
 }
 
+/* Lengths of a transfer: from the coarser of the two lattices. */
+static ascc_status check_transfer(ascc_plan_builder *builder, ascc_term *term, int32_t source_set,
+                                  const ascc_layer *layer)
+{
+    const ascc_plan *plan = &builder->plan;
+    const ascc_quoted name = ascc_quote(layer->name);
+    const int32_t coarser = source_set > layer->set ? source_set : layer->set;
+    term->voxel = 0.0;
+    for (int i = 0; i < 2; i++) {
+        const int32_t set = i ? layer->set : source_set;
+        if (set >= ASCC_SET_LEVEL)
+            term->voxel = fmax(term->voxel, plan->level[set - ASCC_SET_LEVEL + 1].voxel);
+    }
+    if (coarser < ASCC_SET_LEVEL || source_set == layer->set)
+        return FAIL("layer '%s': a transfer goes from particles to a level, from a level to "
+                    "particles or between two levels",
+                    name.text);
+    if (plan->sampling == ASCC_SAMPLING_FARTHEST)
+        return FAIL("layer '%s': a transfer needs levels on a lattice, not 'farthest'", name.text);
+    term->filter = (ascc_filter){.cells = {1, 1, 1},
+                                 .window = ASCC_WINDOW_HAT,
+                                 .radius = term->voxel * sqrt((double)plan->dimension)};
+    return ASCC_OK;
+}
+
 static ascc_status check_term(ascc_plan_builder *builder, ascc_plan_term *entry, const char *weight,
                               const char *bias)
 {
@@ -267,17 +319,26 @@ static ascc_status check_term(ascc_plan_builder *builder, ascc_plan_term *entry,
     if (term->inputs == 0)
         return FAIL("layer '%s': a source without channels", name.text);
     const int32_t source_set = ascc_plan_value_set(builder->layer, term->source);
-    if (term->kind != ASCC_TERM_CONVOLUTION && !share_rows(source_set, layer->set))
+    if (!ascc_term_searches(term) && !share_rows(source_set, layer->set))
         return FAIL("layer '%s': a source that shares no points with the layer", name.text);
+
+    if (term->kind == ASCC_TERM_TRANSFER) {
+        status = check_transfer(builder, term, source_set, layer);
+        if (status != ASCC_OK)
+            return status;
+    }
 
     if (weight) {
         const bool convolution = term->kind == ASCC_TERM_CONVOLUTION;
-        status = find_tensor(builder, weight, convolution ? 5 : 2, &entry->weight);
+        const bool basis = convolution && term->filter.bumps > 0;
+        status = find_tensor(builder, weight, basis ? 4 : convolution ? 5 : 2, &entry->weight);
         if (status != ASCC_OK)
             return status;
         const ascc_tensor *tensor = &builder->file->tensor[entry->weight];
         status = check_inputs(builder, tensor, term->inputs, &term->outputs);
-        if (status == ASCC_OK && convolution)
+        if (status == ASCC_OK && basis)
+            status = check_basis(builder, tensor, &term->filter);
+        else if (status == ASCC_OK && convolution)
             status = check_cells(builder, tensor, ASCC_FULL, term->filter.cells);
         if (status == ASCC_OK && convolution)
             status = check_filter(builder, &term->filter, name.text);
@@ -321,6 +382,42 @@ ascc_status ascc_plan_add_term(ascc_plan_builder *builder, const ascc_term *term
     return ASCC_OK;
 }
 
+static ascc_status check_output_grid(ascc_plan_builder *builder, ascc_output *own,
+                                     const char *weight, int32_t storage, int32_t *outputs)
+{
+    ascc_status status = find_tensor(builder, weight, 5, &builder->output_tensor);
+    if (status != ASCC_OK)
+        return status;
+    const ascc_tensor *tensor = &builder->file->tensor[builder->output_tensor];
+    builder->output_storage = storage;
+    status = check_inputs(builder, tensor, own->inputs, outputs);
+    return status == ASCC_OK ? check_cells(builder, tensor, storage, own->filter.cells) : status;
+}
+
+/* Central impulses need one scale for all directions. */
+static ascc_status check_output_basis(ascc_plan_builder *builder, ascc_output *own,
+                                      const char *weight)
+{
+    const ascc_status status = find_tensor(builder, weight, 2, &builder->output_tensor);
+    if (status != ASCC_OK)
+        return status;
+    const ascc_tensor *tensor = &builder->file->tensor[builder->output_tensor];
+    if (tensor->shape[0] != (size_t)own->filter.bumps || tensor->shape[1] != (size_t)own->inputs)
+        return FAIL("tensor '%s' has the shape [%zu, %zu], but must have [%d, %d]: bumps, channels",
+                    ascc_quote(tensor->name).text, tensor->shape[0], tensor->shape[1],
+                    (int)own->filter.bumps, (int)own->inputs);
+    for (int32_t i = 1; i < builder->plan.dimension; i++)
+        if (own->scale[i] != own->scale[0])
+            return FAIL("output: with a basis 'scale' must be the same in all directions");
+    const int32_t cells[3] = {1, own->filter.bumps, 1};
+    memcpy(own->filter.cells, cells, sizeof cells);
+    own->filter.mapping = ASCC_MAPPING_DIRECTION;
+    own->filter.window = ASCC_WINDOW_NONE;
+    own->radial = 1;
+    builder->output_storage = ASCC_FULL;
+    return ASCC_OK;
+}
+
 ascc_status ascc_plan_set_output(ascc_plan_builder *builder, const ascc_output *output,
                                  const char *weight, int32_t storage)
 {
@@ -348,15 +445,9 @@ ascc_status ascc_plan_set_output(ascc_plan_builder *builder, const ascc_output *
         own->filter.skip_self = 1;
         status = check_filter(builder, &own->filter, "output");
         if (status == ASCC_OK)
-            status = find_tensor(builder, weight, 5, &builder->output_tensor);
-        if (status != ASCC_OK)
-            return status;
-        const ascc_tensor *tensor = &builder->file->tensor[builder->output_tensor];
-        builder->output_storage = storage;
-        status = check_inputs(builder, tensor, own->inputs, &outputs);
-        if (status == ASCC_OK)
-            status = check_cells(builder, tensor, storage, own->filter.cells);
-        if (status != ASCC_OK)
+            status = own->filter.bumps ? check_output_basis(builder, own, weight)
+                                       : check_output_grid(builder, own, weight, storage, &outputs);
+        if (status != ASCC_OK || own->filter.bumps)
             return status;
     }
     if (outputs != plan->dimension)
@@ -418,9 +509,11 @@ static ascc_status fill_output(ascc_plan_builder *builder, ascc_plan *plan, floa
         return ASCC_OK;
     const ascc_tensor *tensor = &builder->file->tensor[builder->output_tensor];
     const float *stored = weights + builder->offset[builder->output_tensor];
+    output->weight = stored;
+    if (output->filter.bumps)
+        return ASCC_OK;
     const size_t size = kernel_size(output, plan->dimension);
     const size_t values = (size_t)output->inputs * (size_t)plan->dimension;
-    output->weight = stored;
     if (builder->output_storage != ASCC_FULL) {
         expand_half(output, plan->dimension, builder->output_storage, stored, weights + at);
         output->weight = weights + at;
@@ -509,7 +602,7 @@ static double layer_radius(const ascc_plan *plan, const ascc_layer *layer)
     double radius = 0.0;
     for (int32_t i = 0; i < layer->term_count; i++) {
         const ascc_term *term = &plan->term[layer->first_term + i];
-        if (term->kind == ASCC_TERM_CONVOLUTION)
+        if (ascc_term_searches(term))
             radius = fmax(radius, term->filter.radius);
     }
     return radius;
@@ -542,7 +635,7 @@ double ascc_plan_receptive_radius(const ascc_plan *plan)
         for (int32_t t = 0; t < layer->term_count; t++) {
             const ascc_term *term = &plan->term[layer->first_term + t];
             const int32_t set = ascc_plan_value_set(plan->layer, term->source);
-            const double radius = term->kind == ASCC_TERM_CONVOLUTION ? term->filter.radius : 0.0;
+            const double radius = ascc_term_searches(term) ? term->filter.radius : 0.0;
             farthest =
                 fmax(farthest, radius + fmax(reach[term->source], sampling_reach(plan, set)));
         }
@@ -558,7 +651,7 @@ int32_t ascc_plan_neighbor_limit(const ascc_plan *plan)
     int32_t most = 0;
     for (int32_t i = 0; i < plan->term_count; i++) {
         const ascc_term *term = &plan->term[i];
-        if (term->kind != ASCC_TERM_CONVOLUTION)
+        if (!ascc_term_searches(term))
             continue;
         if (term->filter.neighbor_limit == 0)
             return 0;

@@ -206,16 +206,43 @@ int32_t ascc_safetensors_find(const ascc_safetensors *file, const char *name)
     return -1;
 }
 
+bool ascc_tensor_is_float(const ascc_tensor *tensor)
+{
+    return strcmp(tensor->type, "F32") == 0 || strcmp(tensor->type, "F16") == 0 ||
+           strcmp(tensor->type, "BF16") == 0;
+}
+
+/* The bits of a float from those of a binary16: every one of them has its equal. */
+static uint32_t widen_half(uint32_t half)
+{
+    const uint32_t sign = (half & 0x8000u) << 16, exponent = half >> 10 & 31u;
+    uint32_t fraction = half & 0x3ffu;
+    if (exponent == 31)
+        return sign | 0x7f800000u | fraction << 13;
+    if (exponent > 0)
+        return sign | (exponent + 112) << 23 | fraction << 13;
+    if (fraction == 0)
+        return sign;
+    uint32_t scale = 113; /* of a subnormal: shifted up until its leading one is the hidden one */
+    for (; !(fraction & 0x400u); fraction <<= 1)
+        scale--;
+    return sign | scale << 23 | (fraction & 0x3ffu) << 13;
+}
+
 ascc_status ascc_tensor_read_floats(const ascc_tensor *tensor, float *values, ascc_message *message)
 {
     const ascc_quoted name = ascc_quote(tensor->name);
-    if (strcmp(tensor->type, "F32") != 0)
-        return FAIL("tensor '%s' is %s; weights must be F32", name.text, tensor->type);
+    const bool half = strcmp(tensor->type, "F16") == 0;
+    if (!ascc_tensor_is_float(tensor))
+        return FAIL("tensor '%s' is %s; weights must be F32, F16 or BF16", name.text, tensor->type);
     uint32_t bad = 0;
     for (size_t i = 0; i < tensor->count; i++) {
-        const unsigned char *b = tensor->data + 4 * i;
-        const uint32_t bits =
-            (uint32_t)b[0] | (uint32_t)b[1] << 8 | (uint32_t)b[2] << 16 | (uint32_t)b[3] << 24;
+        const unsigned char *b = tensor->data + tensor->element_size * i;
+        uint32_t bits = (uint32_t)b[0] | (uint32_t)b[1] << 8;
+        if (tensor->element_size == 4)
+            bits |= (uint32_t)b[2] << 16 | (uint32_t)b[3] << 24;
+        else
+            bits = half ? widen_half(bits) : bits << 16;
         bad |= (bits & 0x7f800000u) == 0x7f800000u;
         memcpy(values + i, &bits, sizeof bits);
     }

@@ -44,7 +44,11 @@ const char *ascc_safetensors_metadata(ascc_safetensors *file, const char *key);
 /* Index of the tensor with that name, -1 = none. */
 int32_t ascc_safetensors_find(const ascc_safetensors *file, const char *name);
 
-/* values[count] = the tensor's; errors: FORMAT when it is no F32 or a value is not finite. */
+/* Its type is F32, F16 or BF16: what ascc_tensor_read_floats takes. */
+bool ascc_tensor_is_float(const ascc_tensor *tensor);
+
+/* values[count] = the tensor's, shorter floats widened exactly; errors: FORMAT when it is no float of
+ * those or a value is not finite. */
 ascc_status ascc_tensor_read_floats(const ascc_tensor *tensor, float *values,
                                     ascc_message *message);
 

@@ -3,6 +3,7 @@
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
+#include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
 #include <stdio.h>
@@ -132,18 +133,19 @@ static void search_sees_across_the_wrap_of_the_low_words(void **state)
 /* ---- geometry ---- */
 
 typedef struct pair_arrays {
-    float *x, *y, *z, *poly6, *peak;
+    float *x, *y, *z, *poly6, *peak, *hat, *distance;
 } pair_arrays;
 
 static pair_arrays take_pairs(size_t k)
 {
-    const pair_arrays p = {guarded(k), guarded(k), guarded(k), guarded(k), guarded(k)};
+    const pair_arrays p = {guarded(k), guarded(k), guarded(k), guarded(k),
+                           guarded(k), guarded(k), guarded(k)};
     return p;
 }
 
 static ascc_pairs as_pairs(const pair_arrays *p)
 {
-    const ascc_pairs pairs = {p->x, p->y, p->z, {NULL, p->poly6, p->peak}};
+    const ascc_pairs pairs = {p->x, p->y, p->z, {NULL, p->poly6, p->peak, p->hat}, p->distance};
     return pairs;
 }
 
@@ -154,6 +156,8 @@ static void drop_pairs(pair_arrays *p)
     free(p->z);
     free(p->poly6);
     free(p->peak);
+    free(p->hat);
+    free(p->distance);
 }
 
 static void geometry_has_the_same_bits_on_every_cpu(void **state)
@@ -171,7 +175,7 @@ static void geometry_has_the_same_bits_on_every_cpu(void **state)
     x[4] = y[4] = 0;
     x[5] = y[5] = z[5] = 1 << 20;
     const ascc_coordinates points = {x, y, z};
-    for (int mapping = 0; mapping < 3; mapping++)
+    for (int mapping = 0; mapping < 4; mapping++)
         for (size_t k = 0; k < 40; k++) {
             uint32_t neighbor[40];
             for (size_t i = 0; i < k; i++)
@@ -188,6 +192,8 @@ static void geometry_has_the_same_bits_on_every_cpu(void **state)
                 check_same_bits(want.z, got.z, k + 8, "z");
                 check_same_bits(want.poly6, got.poly6, k + 8, "poly6");
                 check_same_bits(want.peak, got.peak, k + 8, "peak");
+                check_same_bits(want.hat, got.hat, k + 8, "hat");
+                check_same_bits(want.distance, got.distance, k + 8, "distance");
                 drop_pairs(&got);
             }
             check_guard(want.x, k);
@@ -211,6 +217,9 @@ static void geometry_of_opposite_displacements_is_opposite(void **state)
         kernels.geometry(&points, neighbor, 2, 0, 0, 0, 1.0f / 67108864.0f, 2, &pairs);
         assert_true(p.x[0] == -p.x[1] && p.y[0] == -p.y[1] && p.z[0] == -p.z[1]);
         assert_true(p.poly6[0] == p.poly6[1] && p.peak[0] == p.peak[1]);
+        kernels.geometry(&points, neighbor, 2, 0, 0, 0, 1.0f / 67108864.0f, 3, &pairs);
+        assert_true(p.x[0] == -p.x[1] && p.y[0] == -p.y[1] && p.z[0] == -p.z[1]);
+        assert_true(p.distance[0] == p.distance[1]);
         drop_pairs(&p);
     }
 }
@@ -247,6 +256,183 @@ static void the_volume_map_fills_the_cube_and_stays_inside(void **state)
     assert_true(largest > 0.999999);
 }
 
+/* ---- the basis ---- */
+
+/* Bump and harmonic in doubles, straight from docs/file-format.md. */
+static double bump_of(double distance, size_t bumps, size_t number)
+{
+    const double t = distance * (double)bumps - (double)number;
+    return fabs(t) < 1.0 ? pow(1.0 - t * t, 2.0) : 0.0;
+}
+
+static double harmonic_of(const double u[3], size_t harmonics, size_t number)
+{
+    const bool plane = harmonics == 3 || harmonics == 5;
+    const double x = u[0], y = u[1], z = u[2];
+    const double flat[5] = {1.0, x, y, 2.0 * x * y, x * x - y * y};
+    const double full[9] = {1.0,
+                            x,
+                            y,
+                            z,
+                            sqrt(3.0) * x * y,
+                            sqrt(3.0) * y * z,
+                            sqrt(3.0) * z * x,
+                            sqrt(0.75) * (x * x - y * y),
+                            (2.0 * z * z - x * x - y * y) / 2.0};
+    return plane ? flat[number] : full[number];
+}
+
+/* Random displacements in the ball around the origin; the first is at its centre, the second on its
+ * surface. */
+typedef struct basis_case {
+    int32_t x[64], y[64], z[64];
+    uint32_t neighbor[64];
+    ascc_coordinates points;
+} basis_case;
+
+#define BASIS_RADIUS 50000000
+
+static void random_basis(basis_case *c, bool plane)
+{
+    c->points = (ascc_coordinates){c->x, c->y, c->z};
+    for (size_t i = 0; i < 64; i++) {
+        double d[3], length = 0.0;
+        for (int n = 0; n < 3; n++) {
+            d[n] = plane && n == 2 ? 0.0 : (double)uniform();
+            length += d[n] * d[n];
+        }
+        const double scale = BASIS_RADIUS * ((double)uniform() + 1.0) / 2.0 / sqrt(length);
+        c->x[i] = (int32_t)(d[0] * scale);
+        c->y[i] = (int32_t)(d[1] * scale);
+        c->z[i] = (int32_t)(d[2] * scale);
+        c->neighbor[i] = (uint32_t)((i * 29 + 5) % 64);
+    }
+    c->x[5] = c->y[5] = c->z[5] = 0;
+    c->x[34] = BASIS_RADIUS;
+    c->y[34] = c->z[34] = 0;
+}
+
+static double unit_of(const basis_case *c, uint32_t row, double unit[3])
+{
+    const double d[3] = {c->x[row], c->y[row], c->z[row]};
+    const double length = sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
+    for (int n = 0; n < 3; n++)
+        unit[n] = length > 0.0 ? d[n] / length : 0.0;
+    return length / BASIS_RADIUS;
+}
+
+static void the_basis_equals_doubles_and_has_the_same_bits_on_every_cpu(void **state)
+{
+    (void)state;
+    static const size_t harmonics[] = {1, 3, 5, 4, 9};
+    ascc_kernels table[16];
+    const int count = tables(table);
+    for (size_t h = 0; h < 5; h++)
+        for (size_t bumps = 1; bumps <= 8; bumps++)
+            for (size_t k = 0; k < 40; k += 1 + k / 3)
+                for (size_t a = 8; a <= 40; a += 8) {
+                    const size_t members = bumps * harmonics[h], stride = (k + 15) / 8 * 8;
+                    basis_case c;
+                    random_basis(&c, harmonics[h] == 3 || harmonics[h] == 5);
+                    float *feature = floats(64 * a), *want = guarded(members * a);
+                    double *sum = calloc(members * a + 1, sizeof *sum);
+                    assert_non_null(sum);
+                    for (size_t i = 0; i < k; i++) {
+                        double unit[3];
+                        const double distance = unit_of(&c, c.neighbor[i], unit);
+                        for (size_t m = 0; m < members; m++)
+                            for (size_t j = 0; j < a; j++)
+                                sum[m * a + j] +=
+                                    bump_of(distance, bumps, m / harmonics[h]) *
+                                    harmonic_of(unit, harmonics[h], m % harmonics[h]) *
+                                    (double)feature[c.neighbor[i] * a + j];
+                    }
+                    for (int t = 0; t < count; t++) {
+                        pair_arrays p = take_pairs(k);
+                        const ascc_pairs pairs = as_pairs(&p);
+                        float *factor = guarded(members * stride), *got = guarded(members * a);
+                        table[t].geometry(&c.points, c.neighbor, k, 0, 0, 0,
+                                          1.0f / (float)BASIS_RADIUS, 3, &pairs);
+                        table[t].basis(&pairs, k, bumps, harmonics[h], factor, stride);
+                        check_guard(factor, members * stride);
+                        table[t].gather_basis(factor, stride, bumps, harmonics[h], c.neighbor, k,
+                                              feature, a, got);
+                        check_guard(got, members * a);
+                        if (t == 0)
+                            memcpy(want, got, members * a * sizeof *got);
+                        check_same_bits(want, got, members * a, "column");
+                        free(factor);
+                        free(got);
+                        drop_pairs(&p);
+                    }
+                    for (size_t n = 0; n < members * a; n++)
+                        assert_true(fabs(sum[n] - (double)want[n]) <
+                                    1e-6 * (double)bumps * (1.0 + (double)k));
+                    free(sum);
+                    free(want);
+                    free(feature);
+                }
+}
+
+static void at_the_centre_only_the_first_harmonic_counts(void **state)
+{
+    (void)state;
+    ascc_kernels kernels;
+    ascc_kernels_select(&kernels, ascc_kernels_available());
+    int32_t zero[1] = {0};
+    const ascc_coordinates points = {zero, zero, zero};
+    const uint32_t neighbor[1] = {0};
+    pair_arrays p = take_pairs(1);
+    const ascc_pairs pairs = as_pairs(&p);
+    float factor[27 * 8];
+    kernels.geometry(&points, neighbor, 1, 0, 0, 0, 1e-6f, 3, &pairs);
+    kernels.basis(&pairs, 1, 3, 9, factor, 8);
+    for (size_t m = 0; m < 27; m++)
+        assert_true(factor[m * 8] == (m == 0 ? 1.0f : 0.0f));
+    drop_pairs(&p);
+}
+
+static void pair_strengths_equal_doubles_and_have_the_same_bits_on_every_cpu(void **state)
+{
+    (void)state;
+    ascc_kernels table[16];
+    const int count = tables(table);
+    for (size_t bumps = 1; bumps <= 8; bumps++)
+        for (size_t k = 0; k < 20; k++) {
+            float *distance = floats(k + 1), *center = floats(8), *feature = floats(50 * 8);
+            uint32_t neighbor[20];
+            for (size_t n = bumps; n < 8; n++) {
+                center[n] = 0.0f;
+                for (size_t i = 0; i < 50; i++)
+                    feature[i * 8 + n] = 0.0f;
+            }
+            float *want = guarded(k);
+            for (size_t i = 0; i < k; i++) {
+                distance[i] = fabsf(distance[i]);
+                neighbor[i] = next() % 50;
+            }
+            table[0].pair_strengths(distance, neighbor, k, center, feature, bumps, want);
+            check_guard(want, k);
+            for (size_t i = 0; i < k; i++) {
+                double sum = 0.0;
+                for (size_t n = 0; n < bumps; n++)
+                    sum += bump_of((double)distance[i], bumps, n) *
+                           ((double)center[n] + (double)feature[neighbor[i] * 8 + n]);
+                assert_true(fabs(sum - (double)want[i]) < 2e-6 * (double)bumps);
+            }
+            for (int t = 1; t < count; t++) {
+                float *got = guarded(k);
+                table[t].pair_strengths(distance, neighbor, k, center, feature, bumps, got);
+                check_same_bits(want, got, k + 8, "pair strengths");
+                free(got);
+            }
+            free(distance);
+            free(center);
+            free(feature);
+            free(want);
+        }
+}
+
 /* ---- gather, multiply, pair terms ---- */
 
 typedef struct gather_case {
@@ -260,8 +446,8 @@ typedef struct gather_case {
 static gather_case random_gather(size_t k, size_t a, const int32_t cells[3])
 {
     gather_case c = {.k = k, .a = a, .cells = {cells[0], cells[1], cells[2]}};
-    c.pairs =
-        (pair_arrays){floats(k + 8), floats(k + 8), floats(k + 8), floats(k + 8), floats(k + 8)};
+    c.pairs = (pair_arrays){floats(k + 8), floats(k + 8), floats(k + 8), floats(k + 8),
+                            floats(k + 8), floats(k + 8), floats(k + 8)};
     c.feature = floats(50 * a);
     for (size_t i = 0; i < k; i++)
         c.neighbor[i] = next() % 50;
@@ -418,6 +604,9 @@ int main(void)
         cmocka_unit_test(geometry_has_the_same_bits_on_every_cpu),
         cmocka_unit_test(geometry_of_opposite_displacements_is_opposite),
         cmocka_unit_test(the_volume_map_fills_the_cube_and_stays_inside),
+        cmocka_unit_test(the_basis_equals_doubles_and_has_the_same_bits_on_every_cpu),
+        cmocka_unit_test(at_the_centre_only_the_first_harmonic_counts),
+        cmocka_unit_test(pair_strengths_equal_doubles_and_have_the_same_bits_on_every_cpu),
         cmocka_unit_test(gather_equals_doubles_and_has_the_same_bits_on_every_cpu),
         cmocka_unit_test(multiply_equals_doubles_and_has_the_same_bits_on_every_cpu),
         cmocka_unit_test(pair_terms_equal_doubles_and_have_the_same_bits_on_every_cpu),

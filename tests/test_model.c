@@ -87,7 +87,7 @@ static void check_plan(const ascc_model *model)
             if (term->kind == ASCC_TERM_CONVOLUTION)
                 must_have(model, term->weight,
                           (size_t)(cells[0] * cells[1] * cells[2] * term->inputs * term->outputs));
-            else if (term->kind == ASCC_TERM_DENSE)
+            else if (term->kind != ASCC_TERM_IDENTITY)
                 must_have(model, term->weight, (size_t)(term->inputs * term->outputs));
             else
                 assert_null(term->weight);
@@ -98,6 +98,11 @@ static void check_plan(const ascc_model *model)
     const ascc_output *output = &plan->output;
     if (output->kind != ASCC_OUTPUT_ANTISYMMETRIC)
         return;
+    if (output->filter.bumps) {
+        must_have(model, output->weight, (size_t)(output->filter.bumps * output->inputs));
+        assert_int_equal(output->radial, 1);
+        return;
+    }
     const size_t cells =
         (size_t)(output->filter.cells[0] * output->filter.cells[1] * output->filter.cells[2]);
     const size_t values = (size_t)(output->inputs * plan->dimension);
@@ -113,13 +118,16 @@ static void check_plan(const ascc_model *model)
 static void random_models_of_all_shapes_load(void **state)
 {
     (void)state;
-    for (int i = 0; i < 2 * 3 * 2 * 2 * 2; i++) {
+    for (int i = 0; i < 2 * 3 * 2 * 2 * 2 * 2; i++) {
         const model_random options = {.seed = (uint64_t)i,
                                       .dimension = 2 + i % 2,
                                       .levels = 1 + i / 2 % 3,
                                       .plain = i / 6 % 2,
                                       .fluid_only = i / 12 % 2,
                                       .half_axis = i / 24 % 2 ? "y" : NULL,
+                                      .bumps = i >= 48 ? 1 + i % 8 : 0,
+                                      .order = i % 3,
+                                      .transfer = i >= 48 && i % 3 != 2,
                                       .method = i % 3 == 0   ? "voxel_centers"
                                                 : i % 3 == 1 ? "voxel_corners"
                                                              : "farthest",
@@ -371,32 +379,36 @@ static void model_outlives_its_context(void **state)
     ascc_model_release(held);
 }
 
-/* The example of docs/file-format.md, with tensors of the shapes that its table states. */
-static void documented_example_loads(void **state)
+typedef struct shaped {
+    const char *name;
+    int rank;
+    size_t shape[5];
+} shaped;
+
+/* A network with tensors of the shapes that a table of docs/file-format.md states. */
+static ascc_model *load_example(const char *network, const shaped *tensors, size_t count)
 {
-    (void)state;
-    static const struct {
-        const char *name;
-        int rank;
-        size_t shape[5];
-    } tensors[] = {{"l0.fluid.kernel", 5, {1, 4, 4, 3, 4}},
-                   {"l0.boundary.kernel", 5, {1, 4, 4, 3, 4}},
-                   {"l0.fluid.bias", 1, {4}},
-                   {"l0.boundary.bias", 1, {4}},
-                   {"l1.kernel", 5, {1, 4, 4, 8, 8}},
-                   {"l2.kernel", 5, {1, 4, 4, 8, 8}},
-                   {"l1.bias", 1, {8}},
-                   {"l2.bias", 1, {8}},
-                   {"l2.dense.bias", 1, {8}},
-                   {"l2.dense.weight", 2, {8, 8}},
-                   {"output.kernel", 5, {1, 3, 6, 8, 2}}};
-    static char page[1 << 16];
     static const float values[1024] = {1.0f};
-    FILE *file = fopen(SOURCE_ROOT "/docs/file-format.md", "rb");
-    assert_non_null(file);
-    page[fread(page, 1, sizeof page - 1, file)] = '\0';
-    fclose(file);
-    char *begin = strstr(page, "```json\n");
+    model_builder builder;
+    model_builder_open(&builder);
+    model_builder_metadata(&builder, "format", "ascc.model");
+    model_builder_metadata(&builder, "version", "1");
+    model_builder_metadata(&builder, "licence", "other keys are carried along");
+    model_builder_metadata(&builder, "network", network);
+    for (size_t i = 0; i < count; i++)
+        model_builder_tensor(&builder, tensors[i].name, tensors[i].rank, tensors[i].shape, values);
+    size_t size;
+    unsigned char *bytes = model_builder_finish(&builder, &size);
+    ascc_model *model = must_load(bytes, size);
+    check_plan(model);
+    assert_string_equal(model->plan.name, "example-2d");
+    return model;
+}
+
+/* The next JSON text of the page, closed and on one line; *page moves behind it. */
+static char *json_block(char **page)
+{
+    char *begin = strstr(*page, "```json\n");
     assert_non_null(begin);
     begin += 8;
     char *end = strstr(begin, "```");
@@ -405,19 +417,63 @@ static void documented_example_loads(void **state)
     for (char *c = begin; *c != '\0'; c++)
         if (*c == '\n')
             *c = ' ';
-    model_builder builder;
-    model_builder_open(&builder);
-    model_builder_metadata(&builder, "format", "ascc.model");
-    model_builder_metadata(&builder, "version", "1");
-    model_builder_metadata(&builder, "licence", "other keys are carried along");
-    model_builder_metadata(&builder, "network", begin);
-    for (size_t i = 0; i < sizeof tensors / sizeof *tensors; i++)
-        model_builder_tensor(&builder, tensors[i].name, tensors[i].rank, tensors[i].shape, values);
-    size_t size;
-    unsigned char *bytes = model_builder_finish(&builder, &size);
-    ascc_model *model = must_load(bytes, size);
-    check_plan(model);
-    assert_string_equal(model->plan.name, "example-2d");
+    *page = end + 1;
+    return begin;
+}
+
+static void documented_examples_load(void **state)
+{
+    (void)state;
+    static const shaped grid[] = {{"l0.fluid.kernel", 5, {1, 4, 4, 3, 4}},
+                                  {"l0.boundary.kernel", 5, {1, 4, 4, 3, 4}},
+                                  {"l0.fluid.bias", 1, {4}},
+                                  {"l0.boundary.bias", 1, {4}},
+                                  {"l1.kernel", 5, {1, 4, 4, 8, 8}},
+                                  {"l2.kernel", 5, {1, 4, 4, 8, 8}},
+                                  {"l1.bias", 1, {8}},
+                                  {"l2.bias", 1, {8}},
+                                  {"l2.dense.bias", 1, {8}},
+                                  {"l2.dense.weight", 2, {8, 8}},
+                                  {"output.kernel", 5, {1, 3, 6, 8, 2}}};
+    static const shaped basis[] = {{"l0.fluid.kernel", 4, {3, 3, 3, 4}},
+                                   {"l0.boundary.kernel", 4, {4, 3, 3, 4}},
+                                   {"l0.fluid.bias", 1, {4}},
+                                   {"l0.boundary.bias", 1, {4}},
+                                   {"down.weight", 2, {8, 8}},
+                                   {"coarse.kernel", 4, {3, 3, 8, 8}},
+                                   {"coarse.bias", 1, {8}},
+                                   {"l1.up.weight", 2, {8, 8}},
+                                   {"l1.up.bias", 1, {8}},
+                                   {"l1.dense.weight", 2, {8, 8}},
+                                   {"output.kernel", 2, {4, 8}}};
+    static char page[1 << 16], whole[1 << 13];
+    FILE *file = fopen(SOURCE_ROOT "/docs/file-format.md", "rb");
+    assert_non_null(file);
+    page[fread(page, 1, sizeof page - 1, file)] = '\0';
+    fclose(file);
+    char *at = page, *first = json_block(&at);
+    ascc_model *model = load_example(first, grid, sizeof grid / sizeof *grid);
+    ascc_model_destroy(&model);
+
+    /* The second changes the last keys of the first. */
+    const char *second = strstr(json_block(&at), "\"sampling\"");
+    const char *changed = strstr(first, "\"sampling\"");
+    assert_true(second && changed);
+    snprintf(whole, sizeof whole, "%.*s%s", (int)(changed - first), first, second);
+    model = load_example(whole, basis, sizeof basis / sizeof *basis);
+    const ascc_plan *plan = &model->plan;
+    assert_int_equal(plan->term[1].filter.bumps, 4);
+    assert_int_equal(plan->term[1].filter.cells[0], 3);
+    assert_int_equal(plan->term[1].filter.mapping, ASCC_MAPPING_DIRECTION);
+    assert_int_equal(plan->term[2].kind, ASCC_TERM_TRANSFER);
+    assert_int_equal(plan->term[2].normalize, 1);
+    assert_int_equal(plan->term[4].normalize, 0);
+    assert_true(plan->term[4].voxel == 0.04);
+    assert_true(fabs(plan->term[4].filter.radius - 0.04 * sqrt(2.0)) < 1e-15);
+    ascc_model_info info = {.size = sizeof info};
+    assert_int_equal(ascc_model_get_info(model, &info), ASCC_OK);
+    assert_int_equal(info.conserves_angular_momentum, 1);
+    assert_int_equal(info.parameter_count, 108 + 144 + 8 + 64 + 576 + 8 + 64 + 8 + 64 + 32);
     ascc_model_destroy(&model);
 }
 
@@ -633,6 +689,82 @@ static void wrong_descriptions_are_refused_by_name(void **state)
         unsigned char *bytes = build(network, NULL, 0, NULL, &size);
         free(network);
         must_refuse(cases[i].to, bytes, size, cases[i].hint);
+    }
+}
+
+/* The base network with its second layer in a basis, or a transfer, and a basis at the end. */
+static void wrong_bases_and_transfers_are_refused_by_name(void **state)
+{
+    (void)state;
+    static const char head[] =
+        "{\"name\":\"n\",\"dimension\":2,\"time_step\":0.01,\"gravity\":[0,-9.81],"
+        "\"particle_spacing\":0.05,\"rest_density\":1000,\"evaluate\":\"current\","
+        "\"features\":{\"fluid\":[\"one\",\"velocity\"],\"boundary\":[]},"
+        "\"levels\":[{\"voxel\":0.1}],\"sampling\":{\"method\":\"voxel_centers\","
+        "\"anchor\":\"world\"},"
+        "\"layers\":[{\"name\":\"a\",\"points\":\"fluid\",\"channels\":2,\"terms\":["
+        "{\"type\":\"convolution\",\"source\":\"fluid\",\"kernel\":\"k\",\"radius\":0.1,"
+        "\"basis\":{\"bumps\":3,\"order\":1}}]},"
+        "{\"name\":\"b\",\"points\":\"level1\",\"channels\":2,\"terms\":["
+        "{\"type\":\"transfer\",\"source\":\"a\",\"weight\":\"w\",\"normalize\":true}]}],"
+        "\"output\":{\"type\":\"antisymmetric\",\"source\":\"a\",\"kernel\":\"o\","
+        "\"radius\":0.1,\"basis\":{\"bumps\":4},\"scale\":[0.01,0.01]}}";
+    static const struct {
+        const char *from, *to, *hint;
+    } cases[] = {
+        {"\"bumps\":3", "\"bumps\":0", "'bumps'"},
+        {"\"bumps\":3", "\"bumps\":9", "'bumps'"},
+        {"\"bumps\":3", "\"bumps\":2", "3 bumps and 3 harmonics, but its basis has 2 and 3"},
+        {"\"order\":1", "\"order\":3", "'order'"},
+        {"\"order\":1", "\"order\":-1", "'order'"},
+        {"\"order\":1", "\"order\":2", "3 bumps and 3 harmonics, but its basis has 3 and 5"},
+        {",\"order\":1", "", "'order'"},
+        {"\"order\":1", "\"order\":1,\"width\":2", "'width'"},
+        {"{\"bumps\":3,\"order\":1}", "3", "'basis'"},
+        {"\"radius\":0.1,\"basis\"", "\"radius\":0.1,\"window\":\"peak\",\"basis\"", "'window'"},
+        {"\"radius\":0.1,\"basis\"", "\"radius\":0.1,\"mapping\":\"volume\",\"basis\"",
+         "'mapping'"},
+        {",\"basis\":{\"bumps\":3,\"order\":1}", "", "'window'"},
+        {"\"kernel\":\"k\"", "\"kernel\":\"w\"", "dimensions"},
+        {"[\"one\",\"velocity\"]", "[\"velocity\"]", "'k' takes 3 channels"},
+        {"\"type\":\"transfer\"", "\"type\":\"dense\"", "'normalize'"},
+        {"\"points\":\"level1\"", "\"points\":\"fluid\"", "transfer"},
+        {"\"points\":\"level1\"", "\"points\":\"all\"", "transfer"},
+        {"\"method\":\"voxel_centers\",\"anchor\":\"world\"", "\"method\":\"farthest\"", "'ratio'"},
+        {"[{\"voxel\":0.1}],\"sampling\":{\"method\":\"voxel_centers\",\"anchor\":\"world\"}",
+         "[{\"ratio\":0.5}],\"sampling\":{\"method\":\"farthest\"}", "'farthest'"},
+        {"\"normalize\":true", "\"normalize\":1", "'normalize'"},
+        {"\"normalize\":true", "\"radius\":1", "'radius'"},
+        {"\"weight\":\"w\",", "", "'weight'"},
+        {"\"weight\":\"w\"", "\"weight\":\"k\"", "dimensions"},
+        {"\"bumps\":4", "\"bumps\":4,\"order\":1", "'order'"},
+        {"\"bumps\":4", "\"bumps\":3", "[4, 2], but must have [3, 2]"},
+        {"\"kernel\":\"o\"", "\"kernel\":\"k\"", "dimensions"},
+        {"\"scale\":[0.01,0.01]", "\"scale\":[0.01,0.02]", "'scale'"},
+        {"\"scale\"", "\"projection\":\"radial\",\"scale\"", "'projection'"},
+        {"\"scale\"", "\"stored\":\"full\",\"scale\"", "'stored'"},
+        {"\"name\":\"n\"", "\"name\":\"m\"", NULL},
+    };
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        size_t size;
+        char *network = replaced(head, cases[i].from, cases[i].to);
+        model_builder builder;
+        model_builder_open(&builder);
+        model_builder_metadata(&builder, "format", "ascc.model");
+        model_builder_metadata(&builder, "version", "1");
+        model_builder_metadata(&builder, "network", network);
+        add_tensor(&builder, "k", 4, (const size_t[]){3, 3, 3, 2}, 0);
+        add_tensor(&builder, "w", 2, (const size_t[]){2, 2}, 0);
+        add_tensor(&builder, "o", 2, (const size_t[]){4, 2}, 0);
+        unsigned char *bytes = model_builder_finish(&builder, &size);
+        free(network);
+        if (cases[i].hint) {
+            must_refuse(cases[i].to, bytes, size, cases[i].hint);
+            continue;
+        }
+        ascc_model *model = must_load(bytes, size); /* the last: it was right */
+        check_plan(model);
+        ascc_model_destroy(&model);
     }
 }
 
@@ -1091,12 +1223,13 @@ int main(void)
         cmocka_unit_test(demonstration_models_are_antisymmetric_and_radial),
         cmocka_unit_test(halves_are_mirrored_along_each_axis),
         cmocka_unit_test(plan_says_what_the_file_says),
-        cmocka_unit_test(documented_example_loads),
+        cmocka_unit_test(documented_examples_load),
         cmocka_unit_test(saved_again_is_byte_identical),
         cmocka_unit_test(arguments_and_paths_are_checked),
         cmocka_unit_test(model_outlives_its_context),
         cmocka_unit_test(base_network_loads),
         cmocka_unit_test(wrong_descriptions_are_refused_by_name),
+        cmocka_unit_test(wrong_bases_and_transfers_are_refused_by_name),
         cmocka_unit_test(layers_without_terms_are_refused),
         cmocka_unit_test(wrong_tensors_are_refused_by_name),
         cmocka_unit_test(kernels_have_a_bounded_number_of_cells),

@@ -1,5 +1,6 @@
 /* The safetensors reader: every malformed header is refused and every good byte is found.
  * SPDX-License-Identifier: MIT */
+#include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -268,7 +269,53 @@ static void too_many_tensors_are_refused(void **state)
     }
 }
 
-static void floats_must_be_f32_and_finite(void **state)
+static ascc_tensor tensor_of(const char *type, size_t size, size_t count, const void *data)
+{
+    return (ascc_tensor){.name = "t",
+                         .type = type,
+                         .element_size = size,
+                         .rank = 1,
+                         .shape = {count},
+                         .count = count,
+                         .data = data};
+}
+
+/* A short float of `fraction` bits after its exponent, by the definition of the format. */
+static double value_of(unsigned bits, int fraction)
+{
+    const int exponent_bits = 15 - fraction, bias = (1 << (exponent_bits - 1)) - 1;
+    const int exponent = (int)(bits >> fraction) & ((1 << exponent_bits) - 1);
+    const int tail = (int)bits & ((1 << fraction) - 1);
+    const double size = exponent ? ldexp(tail + (1 << fraction), exponent - bias - fraction)
+                                 : ldexp(tail, 1 - bias - fraction);
+    return bits >> 15 ? -size : size;
+}
+
+static void every_short_float_is_widened_exactly(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *type;
+        int fraction;
+    } formats[] = {{"F16", 10}, {"BF16", 7}};
+    for (size_t f = 0; f < 2; f++)
+        for (unsigned bits = 0; bits < 65536; bits++) {
+            const unsigned char bytes[3] = {0, (unsigned char)bits, (unsigned char)(bits >> 8)};
+            const ascc_tensor tensor = tensor_of(formats[f].type, 2, 1, bytes + 1);
+            float read;
+            const ascc_status status = ascc_tensor_read_floats(&tensor, &read, &message);
+            const unsigned exponent = (bits & 0x7fffu) >> formats[f].fraction;
+            if (exponent + 1 == 1u << (15 - formats[f].fraction)) { /* infinite or no number */
+                assert_int_equal(status, ASCC_ERROR_FORMAT);
+                continue;
+            }
+            assert_int_equal(status, ASCC_OK);
+            assert_true((double)read == value_of(bits, formats[f].fraction));
+            assert_true((signbit(read) != 0) == (bits >> 15 != 0));
+        }
+}
+
+static void floats_must_be_finite(void **state)
 {
     (void)state;
     float values[3], read[3];
@@ -276,19 +323,13 @@ static void floats_must_be_f32_and_finite(void **state)
     for (size_t i = 0; i < 4; i++) {
         memcpy(values, numbers(), sizeof values);
         memcpy(&values[2], &bad[i], 4);
-        const ascc_tensor tensor = {.name = "t",
-                                    .type = "F32",
-                                    .element_size = 4,
-                                    .rank = 1,
-                                    .shape = {3},
-                                    .count = 3,
-                                    .data = (const unsigned char *)values};
+        const ascc_tensor tensor = tensor_of("F32", 4, 3, values);
         assert_int_equal(ascc_tensor_read_floats(&tensor, read, &message), ASCC_ERROR_FORMAT);
         assert_non_null(strstr(message.text, "'t'"));
     }
-    const ascc_tensor half = {.name = "h", .type = "F16", .element_size = 2, .count = 0};
-    assert_int_equal(ascc_tensor_read_floats(&half, read, &message), ASCC_ERROR_FORMAT);
-    assert_non_null(strstr(message.text, "F16"));
+    const ascc_tensor whole = tensor_of("I16", 2, 0, values);
+    assert_int_equal(ascc_tensor_read_floats(&whole, read, &message), ASCC_ERROR_FORMAT);
+    assert_non_null(strstr(message.text, "I16"));
 }
 
 static void every_failing_allocation_is_reported(void **state)
@@ -330,7 +371,8 @@ int main(void)
         cmocka_unit_test(header_length_is_checked),
         cmocka_unit_test(every_truncation_is_refused),
         cmocka_unit_test(too_many_tensors_are_refused),
-        cmocka_unit_test(floats_must_be_f32_and_finite),
+        cmocka_unit_test(every_short_float_is_widened_exactly),
+        cmocka_unit_test(floats_must_be_finite),
         cmocka_unit_test(every_failing_allocation_is_reported),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -21,7 +21,9 @@ typedef struct world_options {
     int32_t dimension, threads, neighbor_limit;
     uint32_t cpu_disable;
     bool radial, walls, unequal, random_network;
-    const char *method; /* of sampling; NULL = voxel centres */
+    const char *method;         /* of sampling; NULL = voxel centres */
+    int bumps, order, transfer; /* of the random network: see model_random */
+    const char *type;           /* of its weights, all of which every type holds */
     uint32_t shuffle;
     double far;  /* one more particle this far away; 0 = none */
     double unit; /* metres in the host's length; 0 = 1 */
@@ -42,8 +44,17 @@ static ascc_model *make_model(ascc_context *context, const world_options *o)
                                 .levels = 2,
                                 .channels = 8,
                                 .spacing = spacing,
-                                .method = o->method,
                                 .projection = o->radial ? "radial" : "none",
+                                .scale = o->bumps ? 0.001 : 0.0,
+                                .bumps = o->bumps,
+                                .order = o->order,
+                                .transfer = o->transfer,
+                                .method = o->method     ? o->method
+                                          : o->transfer ? "voxel_corners"
+                                                        : "voxel_centers",
+                                .no_hysteresis = 1,
+                                .type = o->type,
+                                .coarse = o->type != NULL,
                                 .neighbor_limit = o->neighbor_limit};
         bytes = model_builder_random(&r, &size);
     } else {
@@ -228,15 +239,34 @@ static void momentum_is_the_same_integer_after_a_collision(void **state)
         }
 }
 
+static void momentum_is_the_same_integer_with_a_basis(void **state)
+{
+    (void)state;
+    for (int variant = 0; variant < 24; variant++) {
+        const world_options o = {.dimension = 2 + (variant & 1),
+                                 .threads = variant % 3 == 2 ? 7 : 1 + variant % 3,
+                                 .unequal = variant & 2,
+                                 .random_network = true,
+                                 .bumps = 1 + variant % 8,
+                                 .order = variant / 2 % 3,
+                                 .transfer = variant / 8,
+                                 .neighbor_limit = variant & 4 ? 6 : 0};
+        check_free_momentum(&o, 8); /* such networks tear the drops apart */
+    }
+}
+
 static void fluid_and_wall_impulses_sum_to_the_external_impulse(void **state)
 {
     (void)state;
-    for (int variant = 0; variant < 8; variant++) {
+    for (int variant = 0; variant < 16; variant++) {
         const world_options o = {.dimension = 3 - (variant & 1),
                                  .threads = variant & 2 ? 7 : 1,
                                  .walls = true,
                                  .unequal = variant & 4,
-                                 .random_network = variant & 2};
+                                 .random_network = (variant & 2) || variant >= 8,
+                                 .bumps = variant >= 8 ? 3 : 0,
+                                 .order = 1,
+                                 .transfer = variant >= 8};
         world w = open_world(&o);
         int64_t walls_felt = 0;
         for (int n = 0; n < 20; n++) {
@@ -292,11 +322,35 @@ static void radial_projection_conserves_angular_momentum(void **state)
         }
 }
 
-static void pair_impulses_are_along_the_line_with_radial_projection(void **state)
+static void a_basis_conserves_angular_momentum(void **state)
 {
     (void)state;
-    const world_options o = {.dimension = 3, .threads = 1, .radial = true, .random_network = true};
-    world w = open_world(&o);
+    for (int variant = 0; variant < 8; variant++) {
+        const world_options o = {.dimension = 2 + (variant & 1),
+                                 .threads = 2,
+                                 .unequal = variant & 2,
+                                 .random_network = true,
+                                 .bumps = 4,
+                                 .order = 1,
+                                 .transfer = variant & 4 ? 1 : 0};
+        world w = open_world(&o);
+        ascc_model_info info = {.size = sizeof info};
+        assert_int_equal(ascc_model_get_info(w.model, &info), ASCC_OK);
+        assert_true(info.conserves_angular_momentum);
+        ascc_measures a = {.size = sizeof a}, b = {.size = sizeof b};
+        assert_int_equal(ascc_particles_measure(w.particles, &a), ASCC_OK);
+        run(&w, no_gravity, 200);
+        assert_int_equal(ascc_particles_measure(w.particles, &b), ASCC_OK);
+        for (int c = 0; c < 3; c++)
+            assert_true(fabs(a.angular_momentum[c] - b.angular_momentum[c]) <
+                        1e-6 * a.angular_scale);
+        close_world(&w);
+    }
+}
+
+static void check_pair_impulse_is_along_the_line(const world_options *o)
+{
+    world w = open_world(o);
     const double x[6] = {0.01, 0.02, 0.03, 0.04, 0.05, 0.02};
     const ascc_const_array position = {.data = x, .scalar = ASCC_DOUBLE};
     assert_int_equal(ascc_particles_clear(w.particles, ASCC_FLUID), ASCC_OK);
@@ -310,6 +364,16 @@ static void pair_impulses_are_along_the_line_with_radial_projection(void **state
     assert_true(fabs((double)p[1] / (double)p[0] - 1.0) < 1e-5);
     assert_true(fabs((double)p[2] / (double)p[0] + 1.0 / 3.0) < 1e-5);
     close_world(&w);
+}
+
+static void pair_impulses_are_along_the_line_with_radial_projection_or_a_basis(void **state)
+{
+    (void)state;
+    world_options o = {.dimension = 3, .threads = 1, .radial = true, .random_network = true};
+    check_pair_impulse_is_along_the_line(&o);
+    o.radial = false;
+    o.bumps = 2;
+    check_pair_impulse_is_along_the_line(&o);
 }
 
 /* ---- Determinism ---- */
@@ -326,11 +390,14 @@ static uint64_t hash_after(const world_options *o, int32_t steps)
 static void bits_do_not_depend_on_threads_cpu_or_order(void **state)
 {
     (void)state;
-    for (int variant = 0; variant < 8; variant++) {
+    for (int variant = 0; variant < 16; variant++) {
         world_options o = {.dimension = 3 - (variant & 1),
                            .threads = 1,
-                           .random_network = variant & 2,
+                           .random_network = (variant & 2) || variant >= 8,
                            .walls = variant & 4,
+                           .bumps = variant >= 8 ? variant - 7 : 0,
+                           .order = variant % 3,
+                           .transfer = variant >= 8 ? 1 + (variant & 1) : 0,
                            .neighbor_limit = variant & 2 ? 9 : 0};
         const int32_t steps = o.random_network ? 20 : 60;
         const uint64_t want = hash_after(&o, steps);
@@ -363,6 +430,24 @@ static void every_way_of_sampling_steps_with_the_same_bits(void **state)
         assert_true(hash_after(&o, 5) == seen[m]);
     }
     assert_true(seen[0] != seen[1] && seen[1] != seen[2] && seen[0] != seen[2]);
+}
+
+static void short_weights_give_the_bits_of_the_floats_they_stand_for(void **state)
+{
+    (void)state;
+    for (int bumps = 0; bumps < 3; bumps += 2) {
+        world_options o = {.dimension = 2,
+                           .threads = 1,
+                           .random_network = true,
+                           .walls = true,
+                           .bumps = bumps,
+                           .type = "F32"};
+        const uint64_t want = hash_after(&o, 10);
+        o.type = "F16";
+        assert_true(hash_after(&o, 10) == want);
+        o.type = "BF16";
+        assert_true(hash_after(&o, 10) == want);
+    }
 }
 
 /* A host's job system that runs tasks at once, last first. */
@@ -692,10 +777,13 @@ static world_options counted(test_memory *memory, world_options o)
 static void a_steady_step_allocates_nothing(void **state)
 {
     (void)state;
-    for (int random = 0; random < 2; random++) {
+    for (int random = 0; random < 3; random++) {
         test_memory c = {0};
-        const world_options o =
-            counted(&c, (world_options){.dimension = 3, .walls = true, .random_network = random});
+        const world_options o = counted(&c, (world_options){.dimension = 3,
+                                                            .walls = true,
+                                                            .random_network = random,
+                                                            .bumps = random == 2 ? 3 : 0,
+                                                            .transfer = random == 2});
         world w = open_world(&o);
         run(&w, down, 6); /* the scene settles into its memory */
         ascc_const_array still = {.data = w.particles->position, .scalar = ASCC_DOUBLE};
@@ -870,11 +958,14 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(momentum_is_the_same_integer_after_a_collision),
+        cmocka_unit_test(momentum_is_the_same_integer_with_a_basis),
         cmocka_unit_test(fluid_and_wall_impulses_sum_to_the_external_impulse),
         cmocka_unit_test(radial_projection_conserves_angular_momentum),
-        cmocka_unit_test(pair_impulses_are_along_the_line_with_radial_projection),
+        cmocka_unit_test(a_basis_conserves_angular_momentum),
+        cmocka_unit_test(pair_impulses_are_along_the_line_with_radial_projection_or_a_basis),
         cmocka_unit_test(bits_do_not_depend_on_threads_cpu_or_order),
         cmocka_unit_test(every_way_of_sampling_steps_with_the_same_bits),
+        cmocka_unit_test(short_weights_give_the_bits_of_the_floats_they_stand_for),
         cmocka_unit_test(bits_do_not_depend_on_the_hosts_job_system),
         cmocka_unit_test(a_far_particle_changes_no_bit_of_the_others),
         cmocka_unit_test(many_steps_at_once_equal_single_steps),

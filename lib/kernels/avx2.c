@@ -5,12 +5,8 @@
 #include <stdint.h>
 
 #include "kernels.h"
-
-/* Lane numbers of the set bits of each byte, lowest first, a nibble each. */
-static uint32_t compaction(unsigned mask)
-{
-    return _pext_u32(0x76543210u, _pdep_u32(mask, 0x11111111u) * 0xfu);
-}
+#define ASCC_USE_AVX2
+#include "vector.h"
 
 /* The loop of search() in body.h, same operations in the same order. */
 static size_t search_avx2(const ascc_coordinates *points, size_t begin, size_t end, int32_t x,
@@ -18,7 +14,6 @@ static size_t search_avx2(const ascc_coordinates *points, size_t begin, size_t e
 {
     const __m256i qx = _mm256_set1_epi32(x), qy = _mm256_set1_epi32(y), qz = _mm256_set1_epi32(z);
     const __m256 limits = _mm256_set1_ps(limit);
-    const __m256i nibble = _mm256_setr_epi32(0, 4, 8, 12, 16, 20, 24, 28);
     const __m256i steps = _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7);
     size_t count = 0;
     for (size_t i = begin; i < end; i += 8) {
@@ -36,17 +31,11 @@ static size_t search_avx2(const ascc_coordinates *points, size_t begin, size_t e
         const __m256 near =
             _mm256_and_ps(_mm256_cmp_ps(square, limits, _CMP_LE_OQ), _mm256_castsi256_ps(valid));
         const unsigned mask = (unsigned)_mm256_movemask_ps(near);
-        const __m256i lanes =
-            _mm256_and_si256(_mm256_srlv_epi32(_mm256_set1_epi32((int)compaction(mask)), nibble),
-                             _mm256_set1_epi32(7));
-        const __m256i rows = _mm256_add_epi32(_mm256_set1_epi32((int)(uint32_t)i), lanes);
-        _mm256_storeu_si256((__m256i *)(found + count), rows);
-        count += (size_t)_mm_popcnt_u32(mask);
+        count += store_lanes(found + count, (uint32_t)i, mask);
     }
     return count;
 }
 
-#define ASCC_USE_AVX2
 #define SEARCH search_avx2
 #define ASCC_VARIANT ascc_kernels_avx2
 #include "body.h"

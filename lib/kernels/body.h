@@ -99,6 +99,21 @@ static void map_radial(float *RESTRICT px, float *RESTRICT py, float *RESTRICT p
     }
 }
 
+/* Unit vectors and lengths; the centre has no direction. In place. */
+static void map_direction(float *RESTRICT px, float *RESTRICT py, float *RESTRICT pz,
+                          float *RESTRICT distance, size_t k)
+{
+    for (size_t i = 0; i < k; i++) {
+        const float x = px[i], y = py[i], z = pz[i];
+        const float n = sqrtf(x * x + y * y + z * z);
+        const float s = 1.0f / (n > 0.0f ? n : 1.0f);
+        px[i] = x * s;
+        py[i] = y * s;
+        pz[i] = z * s;
+        distance[i] = n;
+    }
+}
+
 static void geometry(const ascc_coordinates *points, const uint32_t *RESTRICT neighbor, size_t k,
                      int32_t x, int32_t y, int32_t z, float inverse_radius, int mapping,
                      const ascc_pairs *pairs)
@@ -124,7 +139,16 @@ static void geometry(const ascc_coordinates *points, const uint32_t *RESTRICT ne
             const float c = t > 0.0f ? t : 0.0f;
             peak[i] = c * c;
         }
-    if (mapping == 2)
+    float *RESTRICT hat = pairs->window[3];
+    if (hat)
+        for (size_t i = 0; i < k; i++) {
+            const float hx = 1.0f - fabsf(px[i]), hy = 1.0f - fabsf(py[i]);
+            const float hz = 1.0f - fabsf(pz[i]);
+            hat[i] = (hx > 0.0f ? hx : 0.0f) * (hy > 0.0f ? hy : 0.0f) * (hz > 0.0f ? hz : 0.0f);
+        }
+    if (mapping == 3)
+        map_direction(px, py, pz, pairs->distance, k);
+    else if (mapping == 2)
         map_volume(px, py, pz, k);
     else if (mapping == 1)
         map_radial(px, py, pz, k);
@@ -225,6 +249,151 @@ static void gather(const ascc_pairs *pairs, const float *window, const uint32_t 
             else if (j < a)
                 spread_1(f + j, w, x, y, z, planes, cell + j);
         }
+    }
+}
+
+/* The bump of this number, of so many, at eight distances. */
+static inline vector bump_at(vector distance, vector bumps, vector number)
+{
+    const vector t = minus(times(bumps, distance), number);
+    const vector u = larger(minus(fill(1.0f), times(t, t)), fill(0.0f));
+    return times(u, u);
+}
+
+/* Harmonics after the first of eight directions; in each order the squares sum to 1. */
+static inline void harmonics_of(vector x, vector y, vector z, size_t harmonics, vector *out)
+{
+    const vector half = fill(0.5f), root3 = fill(1.7320508075688772f);
+    const vector xx = times(x, x), yy = times(y, y);
+    if (harmonics > 1) {
+        out[0] = x;
+        out[1] = y;
+    }
+    if (harmonics == 5) {
+        out[2] = times(add(x, x), y);
+        out[3] = minus(xx, yy);
+    }
+    if (harmonics == 4 || harmonics == 9)
+        out[2] = z;
+    if (harmonics == 9) {
+        out[3] = times(root3, times(x, y));
+        out[4] = times(root3, times(y, z));
+        out[5] = times(root3, times(z, x));
+        out[6] = times(times(half, root3), minus(xx, yy));
+        out[7] = minus(times(z, z), times(half, add(xx, yy)));
+    }
+}
+
+static void basis(const ascc_pairs *pairs, size_t k, size_t bumps, size_t harmonics, float *factor,
+                  size_t stride)
+{
+    const vector count = fill((float)bumps);
+    for (size_t i = 0; i < k; i += LANES) {
+        const vector distance = load(pairs->distance + i);
+        vector y[8];
+        harmonics_of(load(pairs->x + i), load(pairs->y + i), load(pairs->z + i), harmonics, y);
+        float *to = factor + i;
+        for (size_t b = 0; b < bumps; b++, to += stride) {
+            const vector bump = bump_at(distance, count, fill((float)b));
+            store(to, bump);
+            for (size_t h = 1; h < harmonics; h++)
+                store(to += stride, times(bump, y[h - 1]));
+        }
+    }
+}
+
+/* column[members][vectors * 8] += over the picked pairs, all sums in registers; rows of the column are
+ * `a` apart. */
+#define GATHER(name, members, vectors)                                                             \
+    static void name(const float *RESTRICT factor, size_t stride, const uint32_t *RESTRICT pick,   \
+                     size_t k, const uint32_t *RESTRICT neighbor, const float *RESTRICT feature,   \
+                     size_t a, float *RESTRICT column)                                             \
+    {                                                                                              \
+        vector sum[members][vectors];                                                              \
+        for (size_t m = 0; m < members; m++)                                                       \
+            for (size_t c = 0; c < vectors; c++)                                                   \
+                sum[m][c] = load(column + m * a + c * LANES);                                      \
+        for (size_t i = 0; i < k; i++) {                                                           \
+            const float *f = feature + (size_t)neighbor[pick[i]] * a;                              \
+            vector v[vectors];                                                                     \
+            for (size_t c = 0; c < vectors; c++)                                                   \
+                v[c] = load(f + c * LANES);                                                        \
+            for (size_t m = 0; m < members; m++) {                                                 \
+                const vector w = fill(factor[m * stride + pick[i]]);                               \
+                for (size_t c = 0; c < vectors; c++)                                               \
+                    sum[m][c] = fused(w, v[c], sum[m][c]);                                         \
+            }                                                                                      \
+        }                                                                                          \
+        for (size_t m = 0; m < members; m++)                                                       \
+            for (size_t c = 0; c < vectors; c++)                                                   \
+                store(column + m * a + c * LANES, sum[m][c]);                                      \
+    }
+GATHER(gather_6_2, 6, 2)
+GATHER(gather_4_2, 4, 2)
+GATHER(gather_3_2, 3, 2)
+GATHER(gather_1_2, 1, 2)
+GATHER(gather_9_1, 9, 1)
+GATHER(gather_4_1, 4, 1)
+GATHER(gather_3_1, 3, 1)
+GATHER(gather_1_1, 1, 1)
+
+/* Pairs that are picked in one go. */
+#define PICKS 128
+
+/* The members of one bump, over the pairs that it reaches: with many bumps those are few. */
+static void gather_bump(const float *factor, size_t stride, size_t members, const uint32_t *pick,
+                        size_t k, const uint32_t *neighbor, const float *feature, size_t a,
+                        float *column)
+{
+    size_t c = 0;
+#define MEMBERS(gather, count)                                                                     \
+    for (; r + count <= members; r += count)                                                       \
+        gather(factor + r * stride, stride, pick, k, neighbor, feature + c, a, column + r * a + c);
+    for (; c + 2 * LANES <= a; c += 2 * LANES) {
+        size_t r = 0;
+        MEMBERS(gather_6_2, 6)
+        MEMBERS(gather_4_2, 4)
+        MEMBERS(gather_3_2, 3)
+        MEMBERS(gather_1_2, 1)
+    }
+    if (c < a) {
+        size_t r = 0;
+        MEMBERS(gather_9_1, 9)
+        MEMBERS(gather_4_1, 4)
+        MEMBERS(gather_3_1, 3)
+        MEMBERS(gather_1_1, 1)
+    }
+#undef MEMBERS
+}
+
+static void gather_basis(const float *factor, size_t stride, size_t bumps, size_t harmonics,
+                         const uint32_t *neighbor, size_t k, const float *feature, size_t a,
+                         float *column)
+{
+    memset(column, 0, bumps * harmonics * a * sizeof *column);
+    for (size_t b = 0; b < bumps; b++, factor += harmonics * stride, column += harmonics * a)
+        for (size_t begin = 0; begin < k; begin += PICKS) {
+            const size_t end = k - begin < PICKS ? k : begin + PICKS;
+            uint32_t pick[PICKS + LANES];
+            size_t count = 0, i = begin;
+            for (; i + LANES <= end; i += LANES)
+                count += store_positive(pick + count, (uint32_t)i, load(factor + i));
+            for (; i < end; i++) {
+                pick[count] = (uint32_t)i;
+                count += factor[i] > 0.0f;
+            }
+            gather_bump(factor, stride, harmonics, pick, count, neighbor, feature, a, column);
+        }
+}
+
+static void pair_strengths(const float *distance, const uint32_t *neighbor, size_t k,
+                           const float *center, const float *feature, size_t bumps, float *out)
+{
+    static const float numbers[LANES] = {0.0f, 1.0f, 2.0f, 3.0f, 4.0f, 5.0f, 6.0f, 7.0f};
+    const vector number = load(numbers), count = fill((float)bumps), own = load(center);
+    for (size_t i = 0; i < k; i++) {
+        const vector both = add(own, load(feature + (size_t)neighbor[i] * LANES));
+        out[i] = total(times(bump_at(fill(distance[i]), count, number), both));
     }
 }
 
@@ -337,6 +506,9 @@ void ASCC_VARIANT(ascc_kernels *kernels)
     kernels->search = SEARCH;
     kernels->geometry = geometry;
     kernels->gather = gather;
+    kernels->basis = basis;
+    kernels->gather_basis = gather_basis;
+    kernels->pair_strengths = pair_strengths;
     kernels->multiply = multiply;
     kernels->pair_terms = pair_terms;
 }

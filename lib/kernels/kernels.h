@@ -22,7 +22,8 @@ typedef struct ascc_coordinates {
  * be read to the next multiple of 8 pairs; what lies there does not matter. */
 typedef struct ascc_pairs {
     float *x, *y, *z;
-    float *window[3];
+    float *window[4]; /* the last: the hat, (1 - |x|) (1 - |y|) (1 - |z|), no factor below 0 */
+    float *distance;  /* with mapping 3, which turns x, y, z into unit vectors (0 at the centre) */
 } ascc_pairs;
 
 typedef struct ascc_kernels {
@@ -33,7 +34,7 @@ typedef struct ascc_kernels {
                      int32_t z, float limit, uint32_t *found);
 
     /* pairs[k] of the displacements neighbour[k] - (x, y, z), scaled by inverse_radius into the unit
-     * ball and mapped to the cube. mapping is an ascc_mapping. */
+     * ball and mapped to the cube (or to directions). mapping is an ascc_mapping. */
     void (*geometry)(const ascc_coordinates *points, const uint32_t *neighbor, size_t k, int32_t x,
                      int32_t y, int32_t z, float inverse_radius, int mapping,
                      const ascc_pairs *pairs);
@@ -46,6 +47,25 @@ typedef struct ascc_kernels {
     /* out[n][out_stride] += in[n][a] * weight[a][b]: each output one chain of fma over ascending a. */
     void (*multiply)(const float *in, size_t in_stride, size_t n, size_t a, const float *weight,
                      size_t b, float *out, size_t out_stride);
+
+    /* factor[m * stride + j] = basis function m of pair j, m = bump * harmonics + harmonic:
+     * (1 - (bumps * distance - bump)^2)^2 where that square is below 1, else 0, times a harmonic of
+     * the direction (docs/file-format.md): 1; 3 or 5 of them in the plane; 4 or 9 in space. Fills up
+     * to the next multiple of 8 pairs. */
+    void (*basis)(const ascc_pairs *pairs, size_t k, size_t bumps, size_t harmonics, float *factor,
+                  size_t stride);
+
+    /* column[m][a] = sum over k of factor[m * stride + k] * feature[neighbor[k]][a], m < bumps *
+     * harmonics: one chain of fma over neighbours in order. Pairs whose first harmonic is 0 are left
+     * out. column is overwritten. */
+    void (*gather_basis)(const float *factor, size_t stride, size_t bumps, size_t harmonics,
+                         const uint32_t *neighbor, size_t k, const float *feature, size_t a,
+                         float *column);
+
+    /* out[j] = sum over bump < bumps <= 8 of its function of the distance, as in basis, times
+     * (center[bump] + feature[neighbor[j]][bump]); rows of feature are 8 wide, the rest zeros. */
+    void (*pair_strengths)(const float *distance, const uint32_t *neighbor, size_t k,
+                           const float *center, const float *feature, size_t bumps, float *out);
 
     /* out[j][b] = window * sum over a of (center[a] + feature[neighbor[j]][a]) * kernel(j)[b][a],
      * kernel(j) = sum over c of trilinear weight * weight[c][b][a], for each pair j < k on its own.

@@ -9,6 +9,7 @@
 #define ASCC_VECTOR_H
 
 #include <math.h>
+#include <stddef.h>
 #include <stdint.h>
 #include <string.h>
 
@@ -75,6 +76,24 @@ static inline vector whole(vector a)
 static inline void store_whole(int32_t *p, vector a)
 {
     _mm256_storeu_si256((__m256i *)p, _mm256_cvttps_epi32(a));
+}
+
+/* first + the numbers of the set bits of a byte, lowest first; returns how many. p has room for 8. */
+static inline size_t store_lanes(uint32_t *p, uint32_t first, unsigned mask)
+{
+    const __m256i nibble = _mm256_setr_epi32(0, 4, 8, 12, 16, 20, 24, 28);
+    const uint32_t packed = _pext_u32(0x76543210u, _pdep_u32(mask, 0x11111111u) * 0xfu);
+    const __m256i lanes = _mm256_and_si256(
+        _mm256_srlv_epi32(_mm256_set1_epi32((int)packed), nibble), _mm256_set1_epi32(7));
+    _mm256_storeu_si256((__m256i *)p, _mm256_add_epi32(_mm256_set1_epi32((int)first), lanes));
+    return (size_t)_mm_popcnt_u32(mask);
+}
+
+/* first + the numbers of the lanes above 0, ascending; returns how many. p has room for 8. */
+static inline size_t store_positive(uint32_t *p, uint32_t first, vector a)
+{
+    const __m256 positive = _mm256_cmp_ps(a, _mm256_setzero_ps(), _CMP_GT_OQ);
+    return store_lanes(p, first, (unsigned)_mm256_movemask_ps(positive));
 }
 
 #elif defined(ASCC_USE_NEON)
@@ -228,6 +247,20 @@ static inline void store_whole(int32_t *p, vector a)
         p[i] = (int32_t)a.lane[i];
 }
 
+#endif
+
+#if !defined(ASCC_USE_AVX2)
+static inline size_t store_positive(uint32_t *p, uint32_t first, vector a)
+{
+    float lane[LANES];
+    size_t count = 0;
+    store(lane, a);
+    for (uint32_t i = 0; i < LANES; i++) {
+        p[count] = first + i;
+        count += lane[i] > 0.0f;
+    }
+    return count;
+}
 #endif
 
 /* The sum of the lanes, always in this order. */

@@ -90,12 +90,20 @@ void model_builder_metadata(model_builder *builder, const char *key, const char 
     model_text_add(&builder->metadata, "\"");
 }
 
+/* A float cut to a binary16; 0 below its normal range. */
+static uint32_t half_of(uint32_t bits)
+{
+    const uint32_t sign = bits >> 16 & 0x8000u, size = bits & 0x7fffffffu;
+    return size < 113u << 23 ? sign : sign | (size - (112u << 23)) >> 13;
+}
+
 void model_builder_tensor(model_builder *builder, const char *name, int rank, const size_t *shape,
                           const float *values)
 {
     size_t count = 1;
     const size_t begin = builder->data.length;
-    model_text_add(&builder->tensors, ",\"%s\":{\"dtype\":\"F32\",\"shape\":[", name);
+    const char *type = builder->type ? builder->type : "F32";
+    model_text_add(&builder->tensors, ",\"%s\":{\"dtype\":\"%s\",\"shape\":[", name, type);
     for (int i = 0; i < rank; i++) {
         model_text_add(&builder->tensors, "%s%zu", i ? "," : "", shape[i]);
         count *= shape[i];
@@ -103,9 +111,18 @@ void model_builder_tensor(model_builder *builder, const char *name, int rank, co
     for (size_t i = 0; i < count; i++) {
         uint32_t bits;
         memcpy(&bits, &values[i], sizeof bits);
+        if (builder->coarse)
+            bits &= (bits & 0x7fffffffu) < 113u << 23 ? 0 : 0xffff0000u;
         const unsigned char bytes[4] = {(unsigned char)bits, (unsigned char)(bits >> 8),
                                         (unsigned char)(bits >> 16), (unsigned char)(bits >> 24)};
-        add_bytes(&builder->data, bytes, 4);
+        const uint32_t half = half_of(bits);
+        const unsigned char short_bytes[2] = {(unsigned char)half, (unsigned char)(half >> 8)};
+        if (strcmp(type, "F16") == 0)
+            add_bytes(&builder->data, short_bytes, 2);
+        else if (strcmp(type, "BF16") == 0)
+            add_bytes(&builder->data, bytes + 2, 2);
+        else
+            add_bytes(&builder->data, bytes, 4);
     }
     model_text_add(&builder->tensors, "],\"data_offsets\":[%zu,%zu]}", begin, builder->data.length);
 }
@@ -188,6 +205,25 @@ static void add_weights(model_builder *builder, uint64_t *state, const char *nam
     add_random(builder, state, text, 1, kernel + 4, 0.1 * gain);
 }
 
+/* Harmonics up to an order. */
+static size_t harmonics_of(int order, int dimension)
+{
+    return (size_t)(dimension == 2 ? 2 * order + 1 : (order + 1) * (order + 1));
+}
+
+/* name.kernel and name.bias of a convolution with a basis. */
+static void add_basis_weights(model_builder *builder, uint64_t *state, const char *name,
+                              int dimension, int bumps, int order, int in, int out, double gain)
+{
+    char text[64];
+    const size_t shape[4] = {(size_t)bumps, harmonics_of(order, dimension), (size_t)in,
+                             (size_t)out};
+    snprintf(text, sizeof text, "%s.kernel", name);
+    add_random(builder, state, text, 4, shape, gain / sqrt(in));
+    snprintf(text, sizeof text, "%s.bias", name);
+    add_random(builder, state, text, 1, shape + 3, 0.1 * gain);
+}
+
 /* The last kernel: whole and exactly antisymmetric, or its half along an axis. */
 static void add_output_kernel(model_builder *builder, uint64_t *state, const model_random *o)
 {
@@ -195,6 +231,11 @@ static void add_output_kernel(model_builder *builder, uint64_t *state, const mod
     const size_t in = (size_t)o->channels, values = in * (size_t)o->dimension;
     size_t shape[5] = {depth, c, c, in, (size_t)o->dimension};
     const double amplitude = o->gain / sqrt((double)in);
+    if (o->bumps) {
+        add_random(builder, state, "output.kernel", 2, (const size_t[]){(size_t)o->bumps, in},
+                   amplitude);
+        return;
+    }
     if (o->half_axis) {
         shape[2 - (o->half_axis[0] - 'x')] /= 2;
         add_random(builder, state, "output.kernel", 5, shape, amplitude);
@@ -224,10 +265,18 @@ typedef struct random_network {
     int terms; /* of the layer being written */
 } random_network;
 
+/* window NULL: the output's. */
 static void add_filter(random_network *n, int level, const char *window)
 {
-    model_text_add(&n->text, ",\"radius\":%s,\"window\":\"%s\",\"mapping\":\"%s\"",
-                   model_number(n->o.spacing * 2.0 * (double)(1 << level)), window, n->o.mapping);
+    model_text_add(&n->text, ",\"radius\":%s",
+                   model_number(n->o.spacing * n->o.radius * (double)(1 << level)));
+    if (!n->o.bumps)
+        model_text_add(&n->text, ",\"window\":\"%s\",\"mapping\":\"%s\"", window ? window : "peak",
+                       n->o.mapping);
+    else if (window)
+        model_text_add(&n->text, ",\"basis\":{\"bumps\":%d,\"order\":%d}", n->o.bumps, n->o.order);
+    else
+        model_text_add(&n->text, ",\"basis\":{\"bumps\":%d}", n->o.bumps);
     if (n->o.neighbor_limit)
         model_text_add(&n->text, ",\"neighbor_limit\":%d", n->o.neighbor_limit);
 }
@@ -241,7 +290,22 @@ static void add_convolution(random_network *n, const char *name, const char *sou
                    n->terms++ ? "," : "", source, relu ? "true" : "false", column, name, name);
     add_filter(n, level, n->o.window);
     model_text_add(&n->text, ",\"skip_self\":%s}", n->o.skip_self ? "true" : "false");
-    add_weights(&n->builder, &n->state, name, n->o.dimension, n->o.cells, in, out, n->o.gain / 4.0);
+    if (n->o.bumps)
+        add_basis_weights(&n->builder, &n->state, name, n->o.dimension, n->o.bumps, n->o.order, in,
+                          out, n->o.gain / 4.0);
+    else
+        add_weights(&n->builder, &n->state, name, n->o.dimension, n->o.cells, in, out,
+                    n->o.gain / 4.0);
+}
+
+static void add_transfer(random_network *n, const char *name, const char *source, int in, int out)
+{
+    model_text_add(&n->text,
+                   "%s{\"type\":\"transfer\",\"source\":\"%s\",\"relu\":true,"
+                   "\"weight\":\"%s.kernel\",\"bias\":\"%s.bias\",\"normalize\":%s}",
+                   n->terms++ ? "," : "", source, name, name,
+                   n->o.transfer == 2 ? "true" : "false");
+    add_weights(&n->builder, &n->state, name, n->o.dimension, 0, in, out, n->o.gain);
 }
 
 static void add_dense(random_network *n, const char *name, const char *source, int relu, int column,
@@ -284,7 +348,10 @@ static void add_trunk_layer(random_network *n, int layer)
         for (int s = 0; s < sources; s++) {
             snprintf(name, sizeof name, "l%d.conv_%d_%d", layer, s, d);
             snprintf(source, sizeof source, "l%d.%d", layer - 1, s);
-            add_convolution(n, name, source, 1, 0, s > d ? s : d, c, width);
+            if (n->o.transfer && s != d)
+                add_transfer(n, name, source, c, width);
+            else
+                add_convolution(n, name, source, 1, 0, s > d ? s : d, c, width);
         }
         if (d < sources) {
             snprintf(name, sizeof name, "l%d.dense_%d", layer, d);
@@ -323,7 +390,7 @@ static void add_head(random_network *n)
     if (!farthest)
         model_text_add(&n->text, ",\"anchor\":\"%s\"", o->anchor);
     if (strcmp(o->method, "voxel_corners") == 0)
-        model_text_add(&n->text, ",\"hysteresis\":%s", model_number(0.1));
+        model_text_add(&n->text, ",\"hysteresis\":%s", model_number(o->no_hysteresis ? 0.0 : 0.1));
     model_text_add(&n->text, "}");
 }
 
@@ -335,13 +402,16 @@ static void add_output(random_network *n)
                    o->plain ? "plain" : "antisymmetric", o->trunk_layers,
                    o->plain ? "false" : "true", model_number(o->scale * o->spacing));
     if (!o->plain) {
-        model_text_add(&n->text, ",\"kernel\":\"output.kernel\",\"projection\":\"%s\"",
-                       o->projection);
-        if (o->half_axis)
+        model_text_add(&n->text, ",\"kernel\":\"output.kernel\"");
+        if (!o->bumps)
+            model_text_add(&n->text, ",\"projection\":\"%s\"", o->projection);
+        if (o->bumps)
+            ;
+        else if (o->half_axis)
             model_text_add(&n->text, ",\"stored\":\"half\",\"half_axis\":\"%s\"", o->half_axis);
         else
             model_text_add(&n->text, ",\"stored\":\"full\"");
-        add_filter(n, 0, "peak");
+        add_filter(n, 0, NULL);
         add_output_kernel(&n->builder, &n->state, o);
     }
     model_text_add(&n->text, "}}");
@@ -361,6 +431,7 @@ static unsigned char *random_file(const model_random *options, const char *netwo
     o->cells = o->cells ? o->cells : 4;
     o->output_cells = o->output_cells ? o->output_cells : 6;
     o->spacing = o->spacing > 0.0 ? o->spacing : 0.05;
+    o->radius = o->radius > 0.0 ? o->radius : 2.0;
     o->gain = o->gain > 0.0 ? o->gain : 1.0;
     o->scale = o->scale > 0.0 ? o->scale : 0.01;
     o->evaluate = o->evaluate ? o->evaluate : "current";
@@ -371,6 +442,8 @@ static unsigned char *random_file(const model_random *options, const char *netwo
     o->mapping = o->mapping ? o->mapping : "volume";
 
     model_builder_open(&n.builder);
+    n.builder.type = o->type;
+    n.builder.coarse = o->coarse;
     add_head(&n);
     model_text_add(&n.text, ",\"layers\":[");
     add_first_layer(&n);
@@ -390,6 +463,66 @@ static unsigned char *random_file(const model_random *options, const char *netwo
 unsigned char *model_builder_random(const model_random *options, size_t *size)
 {
     return random_file(options, NULL, NULL, size);
+}
+
+/* ---- A cheap network for benchmarks -------------------------------------------------------------- */
+
+static void tiny_layer(random_network *n, const char *name, const char *points, int first)
+{
+    model_text_add(&n->text, "%s{\"name\":\"%s\",\"points\":\"%s\",\"channels\":16,\"terms\":[",
+                   first ? "" : "]},", name, points);
+    n->terms = 0;
+}
+
+unsigned char *model_builder_tiny(double spacing, size_t *size)
+{
+    random_network n = {.o = {.dimension = 3,
+                              .levels = 2,
+                              .spacing = spacing,
+                              .gain = 1.0,
+                              .scale = 1e-6,
+                              .evaluate = "advected",
+                              .method = "voxel_corners",
+                              .window = "none",
+                              .anchor = "world",
+                              .no_hysteresis = 1,
+                              .bumps = 3,
+                              .order = 1,
+                              .transfer = 1,
+                              .radius = 2.25,
+                              .channels = 16},
+                        .state = 7};
+    model_builder_open(&n.builder);
+    add_head(&n);
+    model_text_add(&n.text, ",\"layers\":[");
+    tiny_layer(&n, "a", "fluid", 1);
+    add_convolution(&n, "a.fluid", "fluid", 0, 0, 0, 4, 16);
+    add_convolution(&n, "a.boundary", "boundary", 0, 0, 0, 4, 16);
+    add_dense(&n, "a.dense", "fluid", 0, 0, 4, 16);
+    tiny_layer(&n, "down", "level1", 0);
+    add_transfer(&n, "down.a", "a", 16, 16);
+    tiny_layer(&n, "coarse", "level1", 0);
+    add_convolution(&n, "coarse.down", "down", 1, 0, 1, 16, 16);
+    add_dense(&n, "coarse.dense", "down", 1, 0, 16, 16);
+    tiny_layer(&n, "b", "fluid", 0);
+    add_convolution(&n, "b.a", "a", 1, 0, 0, 16, 16);
+    add_dense(&n, "b.dense", "a", 1, 0, 16, 16);
+    add_transfer(&n, "b.coarse", "coarse", 16, 16);
+    tiny_layer(&n, "c", "fluid", 0);
+    add_convolution(&n, "c.b", "b", 1, 0, 0, 16, 16);
+    add_dense(&n, "c.dense", "b", 1, 0, 16, 16);
+    model_text_add(&n.text,
+                   "]}],\"output\":{\"type\":\"antisymmetric\",\"source\":\"c\","
+                   "\"relu\":true,\"scale\":%s,\"kernel\":\"output.kernel\"",
+                   model_number(n.o.scale * spacing));
+    add_filter(&n, 0, NULL);
+    add_output_kernel(&n.builder, &n.state, &n.o);
+    model_text_add(&n.text, "}}");
+    model_builder_metadata(&n.builder, "format", "ascc.model");
+    model_builder_metadata(&n.builder, "version", "1");
+    model_builder_metadata(&n.builder, "network", n.text.text);
+    model_text_free(&n.text);
+    return model_builder_finish(&n.builder, size);
 }
 
 /* ---- Small networks described as the published ones --------------------------------------------- */

@@ -28,12 +28,14 @@ const char *model_number(double value);
 
 typedef struct model_builder {
     model_text metadata, tensors, data;
+    const char *type; /* of the tensors: "F32", "F16" or "BF16", which cut values; NULL = "F32" */
+    int coarse;       /* 1: values are cut so that all three hold them */
 } model_builder;
 
 void model_builder_open(model_builder *builder);
 /* Escapes the value. */
 void model_builder_metadata(model_builder *builder, const char *key, const char *value);
-/* values[product of shape], F32. */
+/* values[product of shape]. */
 void model_builder_tensor(model_builder *builder, const char *name, int rank, const size_t *shape,
                           const float *values);
 unsigned char *model_builder_finish(model_builder *builder, size_t *size);
@@ -53,6 +55,7 @@ typedef struct model_random {
     int cells;              /* of ordinary kernels along each axis; 0 = 4 */
     int output_cells;       /* of the last kernel, even; 0 = 6 */
     double spacing;         /* m; 0 = 0.05 */
+    double radius;          /* of level 0, in spacings; 0 = 2 */
     double gain;            /* weights are about this over the square root of their number; 0 = 1 */
     double scale;           /* of the output in spacings; 0 = 0.01 */
     const char *evaluate;   /* NULL = "current" */
@@ -67,9 +70,19 @@ typedef struct model_random {
     int skip_self;          /* in ordinary convolutions */
     int plain;              /* 1: the last layer is a convolution, not an antisymmetric one */
     int fluid_only;         /* 1: layers lie on the fluid, walls only feed the first */
+    int bumps;              /* of a basis in place of every grid; 0 = grids */
+    int order;              /* of its harmonics */
+    int transfer;           /* 1: hats between scales in place of convolutions; 2: normalised */
+    int no_hysteresis;      /* of voxel_corners: 0 in place of 0.1 */
+    const char *type;       /* of the tensors; NULL = "F32" */
+    int coarse;             /* 1: weights that F16 and BF16 hold exactly */
 } model_random;
 
 unsigned char *model_builder_random(const model_random *options, size_t *size);
+
+/* A cheap network for benchmarks: 3D, 16 channels, three layers of 3 bumps and order 1 on the fluid, one
+ * within a level of twice the spacing, transfers between the two, an antisymmetric basis at the end. */
+unsigned char *model_builder_tiny(double spacing, size_t *size);
 
 /* The demonstration network of examples/demo_model.h (link demo_model.c too). */
 unsigned char *model_builder_demo(int dimension, double spacing, size_t *size);
