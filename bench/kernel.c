@@ -1,6 +1,6 @@
 /* Every kernel alone, and how near it comes to what the machine allows. SPDX-License-Identifier: MIT
  *
- * The block of 50,000 jittered particles of PERFORMANCE, radius 0.1 = 2 spacings, about 28 neighbours.
+ * A block of 50,000 jittered particles, radius 0.1 = 2 spacings, about 28 neighbours.
  * Useful flops: 16 Cin for each neighbour, 2 * 64 * Cin * Cout for each row; nothing for geometry,
  * search, the antisymmetric layer's mapping, or for padding.
  */
@@ -397,11 +397,11 @@ static const char roof_script[] =
     "  for [i = 1:4] '%DATA%' using (is(word(points, i)) ? $2 : NaN):3 with points pt 7 ps 1.2 "
     "lc rgb word(colour, i), \\\n"
     "  for [i = 1:3] '%DATA%' using (is(word(points, i)) && !crowded(1) ? $2 : NaN):3:1 "
-    "with labels left offset 0.9,0 tc rgb word(colour, i) font ',11', \\\n"
+    "with labels left offset 0.9,0 tc rgb word(colour, i) font ',10', \\\n"
     "  '%DATA%' using (crowded(1) ? $2 : NaN):3:1 "
-    "with labels right offset -0.9,0 tc rgb word(colour, 2) font ',11', \\\n"
+    "with labels right offset -0.9,0 tc rgb word(colour, 2) font ',10', \\\n"
     "  '%DATA%' using (is(word(points, 4)) ? $2 : NaN):3:1 "
-    "with labels center offset 0,0.9 tc rgb word(colour, 4) font ',11'\n";
+    "with labels left offset 0.9,0.25 tc rgb word(colour, 4) font ',10'\n";
 
 static void draw_roofs(const bench_options *o, double peak, const double bandwidth[ROOFS])
 {

@@ -19,9 +19,11 @@ size_t bench_isas(const bench_isa **isas)
     size_t count = 0;
     const uint32_t cpu = ascc_kernels_available();
     found[count++] = (bench_isa){"portable", 0, bench_multiply_add_portable, bench_triad_portable};
+#ifdef BENCH_HAVE_NEON
     if (cpu & ASCC_CPU_NEON)
         found[count++] =
-            (bench_isa){"neon", ASCC_CPU_NEON, bench_multiply_add_portable, bench_triad_portable};
+            (bench_isa){"neon", ASCC_CPU_NEON, bench_multiply_add_neon, bench_triad_neon};
+#endif
 #ifdef BENCH_HAVE_AVX2
     if (cpu & ASCC_CPU_AVX2)
         found[count++] =

@@ -52,11 +52,12 @@ static unsigned char *tiny_model(int32_t dimension, size_t *size)
 static bool load_model(const bench_options *o, const char *name, int32_t dimension, subject *s)
 {
     const bool demo = strcmp(name, "demo") == 0, tiny = strcmp(name, "tiny") == 0;
-    char path[1024];
-    (void)snprintf(path, sizeof path, "%s", name);
+    char published[1024];
+    const char *path = name;
     if (strcmp(name, "dmcf") == 0 || strcmp(name, "cconv") == 0) {
-        (void)snprintf(path, sizeof path, "%s/data/weights/%s-liquid3d.safetensors", o->shared,
-                       name);
+        (void)snprintf(published, sizeof published, "%s/data/weights/%s-liquid3d.safetensors",
+                       o->shared, name);
+        path = published;
         if (access(path, R_OK) != 0)
             return false;
     }
@@ -353,14 +354,19 @@ void bench_step(const bench_options *o)
 /* ---- bench threads ---- */
 
 typedef struct thread_times {
-    double wall[BENCH_REPEATS], cpu[BENCH_REPEATS];
+    double wall[BENCH_REPEATS], cpu[BENCH_REPEATS], caller[BENCH_REPEATS];
 } thread_times;
 
 static void time_once(subject *s, thread_times *t, size_t r)
 {
-    const double cpu = bench_process_seconds();
-    run_step(s);
+    run_step(s); /* the restored state is in the cache again */
+    const double cpu = bench_process_seconds(), caller = bench_seconds();
+    if (ascc_step_run(s->step, s->particles, NULL, 1))
+        bench_fail("step: %s", ascc_step_message(s->step));
+    t->caller[r] = bench_seconds() - caller;
     t->cpu[r] = bench_process_seconds() - cpu;
+    s->last.size = sizeof s->last;
+    (void)ascc_step_get_statistics(s->step, &s->last);
     t->wall[r] = s->last.seconds_total;
 }
 
@@ -369,7 +375,7 @@ static void threads_row(const bench_options *o, bench_table *table, const char *
 {
     subject s[2];
     thread_times t[2];
-    const int32_t threads[2] = {1, o->threads > 1 ? o->threads : 2};
+    const int32_t threads[2] = {1, o->threads};
     for (int k = 0; k < 2; k++) {
         const subject_options with = {o->scene ? o->scene : "block",
                                       model,
@@ -385,31 +391,39 @@ static void threads_row(const bench_options *o, bench_table *table, const char *
         run_step(&s[k]);
         run_step(&s[k]);
     }
-    const size_t repeats = o->quick ? 5 : particles > 10000 ? 9 : 41;
+    const size_t repeats = bench_repeats(o);
     for (size_t r = 0; r < repeats; r++)
         for (int k = 0; k < 2; k++)
             time_once(&s[k], &t[k], r);
-    bench_spread wall[2], cpu[2];
+    bench_spread wall[2], cpu[2], caller[2];
     for (int k = 0; k < 2; k++) {
         wall[k] = bench_spread_of(t[k].wall, repeats);
         cpu[k] = bench_spread_of(t[k].cpu, repeats);
+        caller[k] = bench_spread_of(t[k].caller, repeats);
     }
     const bool equal = ascc_particles_hash(s[0].particles) == ascc_particles_hash(s[1].particles);
-    bench_row(table, "%s,%zu,%d,%.3f,%.3f,%.3f,%.2f,%.2f,%.3f,%s", model, s[0].count, threads[1],
+    bench_row(table, "%s,%zu,%d,%.3f,%.3f,%.2f,%.2f,%.3f,%.2f,%s", model, s[0].count, threads[1],
               wall[0].min * 1e3, wall[1].min * 1e3, wall[0].median / wall[1].median,
               wall[0].min / wall[1].min, cpu[1].median / cpu[0].median,
-              (cpu[1].min / cpu[0].min - 1.0), equal ? "equal" : "DIFFERENT");
+              cpu[0].median / caller[1].median, equal ? "equal" : "DIFFERENT");
     close_subject(&s[0]);
     close_subject(&s[1]);
 }
 
-void bench_threads(const bench_options *o)
+void bench_threads(const bench_options *options)
 {
+    bench_options own = *options; /* other load on the machine tells here: more repeats */
+    const bench_options *o = &own;
+    own.repeats = options->repeats ? options->repeats : options->quick ? 5 : 15;
+    own.threads = options->threads > 1 ? options->threads : 2;
     bench_table table = bench_table_open(
         o, "threads",
-        "one thread and more, in turn; wall-clock, so other load on the machine tells",
-        "model,particles,threads,wall_ms_1,wall_ms_n,speedup_median,speedup_min,cpu_ratio,"
-        "cpu_more,state");
+        "one thread and more, in turn; speedups are wall-clock, so other load tells; cpu_ratio: "
+        "CPU "
+        "time of all threads over that of one alone; relief: CPU time of one alone over the "
+        "caller's",
+        "model,particles,threads,wall_ms_1,wall_ms_n,speedup_median,speedup_min,cpu_ratio,relief,"
+        "state");
     const size_t count = o->particles ? o->particles : o->quick ? 2000 : 50000;
     if (o->model)
         threads_row(o, &table, o->model, count);
@@ -450,7 +464,7 @@ static void scale_row(const bench_options *o, bench_table *table, const char *mo
     subject s;
     if (!open_subject(o, &with, &s))
         return;
-    const step_times t = time_steps(&s, o->quick ? 1 : particles > 200000 ? 3 : 5, 1);
+    const step_times t = time_steps(&s, bench_repeats(o), 1);
     const double ns = 1e9 / (double)s.count;
     bench_row(table, "%s-%dd,%zu,%.1f,%.1f,%.1f,%.0f,%.1f,%lld", model, s.info.dimension, s.count,
               t.phase[TOTAL].median * ns, t.phase[TOTAL].min * ns, t.phase[TOTAL].max * ns,
@@ -459,8 +473,11 @@ static void scale_row(const bench_options *o, bench_table *table, const char *mo
     close_subject(&s);
 }
 
-void bench_scale(const bench_options *o)
+void bench_scale(const bench_options *options)
 {
+    bench_options own = *options;
+    const bench_options *o = &own;
+    own.repeats = options->repeats ? options->repeats : options->quick ? 1 : 5;
     static const size_t sizes[] = {1000, 3000, 10000, 30000, 100000, 300000, 1000000};
     static const struct {
         const char *model;
