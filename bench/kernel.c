@@ -43,7 +43,7 @@ static float *floats(size_t count)
 
 static ascc_pairs pairs_at(float *x, float *y, float *z, float *window)
 {
-    return (ascc_pairs){x, y, z, {NULL, window, NULL}};
+    return (ascc_pairs){.x = x, .y = y, .z = z, .window = {NULL, window, NULL}};
 }
 
 static void geometry_of(const kernel_job *j, size_t row, const ascc_pairs *to)
