@@ -1,0 +1,50 @@
+#!/bin/sh
+# The benchmarks run and write what docs/benchmarks.md says; prints TAP. $1: a build folder.
+# SPDX-License-Identifier: MIT
+cd "$(dirname "$0")/.." || exit 1
+bench=$(cd "${1:-build}" && pwd)/bench/bench
+if [ ! -x "$bench" ]; then
+    echo "1..0 # SKIP built without the benchmarks"
+    exit 0
+fi
+number=0
+failed=0
+folder=$(mktemp -d) || exit 1
+trap 'rm -rf "$folder"' EXIT
+cd "$folder" || exit 1
+
+report() {
+    number=$((number + 1))
+    if [ "$1" -eq 0 ]; then
+        echo "ok $number - $2"
+    else
+        echo "not ok $number - $2"
+        sed 's/^/# /' out
+        failed=1
+    fi
+}
+
+run() { timeout 60 "$bench" "$@" --quick --output results --figures none >out 2>&1; }
+
+# Column COLUMN of every row whose first field starts with PREFIX: all must satisfy the awk TEST of x.
+column() { awk -F, -v p="$2" -v c="$3" 'index($1, p) == 1 { x = $c; n++; if (!('"$4"')) bad = 1 }
+    END { exit bad || !n }' results/*/"$1".csv; }
+
+run kernel --only search --particles 1000
+report $? "the search is timed"
+column kernel search 5 'x > 0'
+report $? "and written as a CSV row for each instruction set"
+grep -q '^# cpu: .*' results/*/kernel.csv && grep -q 'load average' results/*/kernel.csv
+report $? "under a header that names the machine and its load"
+run kernel --only 'layer 8' --particles 1000 && column kernel layer 10 'x > 0 && x < 1'
+report $? "a layer stays below the peak measured next to it"
+run step --scene dam-break --model tiny --particles 500 && column step dam-break 21 'x == 0'
+report $? "a step is timed, and its momentum is exact"
+run step --model nowhere.safetensors
+[ $? -eq 1 ] && grep -q 'nowhere.safetensors' out
+report $? "a model that is not there is named"
+run kernel --cpu 64
+[ $? -eq 1 ] && grep -q 'this machine has only' out
+report $? "a CPU mask that the machine lacks is refused"
+echo "1..$number"
+exit $failed
