@@ -15,16 +15,19 @@ typedef struct pair_job {
     const ascc_impulse_scale *scale;
     const uint8_t *fluid; /* [set rows] 1 = a fluid particle */
     const double *mass;   /* [set rows] 0 for walls */
+    bool uniform;         /* all fluid particles have one mass */
     int64_t *sum;         /* [set rows][dimension] */
     float *share;         /* [set rows][8]: what each row gives each bump of a basis, else NULL */
     size_t chunk, phase;
     atomic_uint_least64_t pairs;
+    atomic_size_t reach;           /* rows that neighbours are apart at most */
     atomic_uint_least64_t bad_row; /* 1 + smallest set row with a value that cannot be held */
 } pair_job;
 
 /* Pairs of one row, copied together for the kernel. */
 typedef struct batch {
     size_t count;
+    size_t pairs; /* so far, of all batches */
     uint32_t neighbor[BATCH];
     float geometry[ASCC_GEOMETRY_ARRAYS * BATCH];
     float term[BATCH][4];  /* of a grid: a vector for each pair */
@@ -52,44 +55,79 @@ static void note_bad_row(pair_job *job, size_t row)
         ;
 }
 
-/* Displacement from row i to a neighbour in units, and its square. */
-static double displacement(const pair_job *job, size_t i, size_t j, double d[3])
+/* Displacements from row i to the batch's neighbours in units, and their squares. */
+static void displacements(const pair_job *job, size_t i, const batch *b, double d[3][BATCH],
+                          double square[BATCH])
 {
-    double square = 0.0;
+    for (size_t k = 0; k < b->count; k++)
+        square[k] = 0.0;
     for (int c = 0; c < 3; c++) {
-        d[c] = (double)(int32_t)((uint32_t)job->rows->source->low[c][j] -
-                                 (uint32_t)job->rows->query->low[c][i]);
-        square += d[c] * d[c];
-    }
-    return square;
-}
-
-/* The impulse on row i from neighbour k of the batch in quanta, before rounding. */
-static void impulse_of(const pair_job *job, size_t i, const batch *b, size_t k, double impulse[3])
-{
-    const ascc_plan *plan = job->run->network->plan;
-    const size_t j = b->neighbor[k];
-    const double mass = pair_mass(job->mass[i], job->mass[j]);
-    double t[3] = {0.0, 0.0, 0.0}, d[3];
-    if (job->share) {
-        const double length = sqrt(displacement(job, i, j, d));
-        const double strength = (double)b->strength[k] * job->scale->factor[0];
-        for (int c = 0; c < 3; c++)
-            t[c] = strength / length * d[c];
-    } else {
-        for (int c = 0; c < plan->dimension; c++)
-            t[c] = (double)b->term[k][c] * job->scale->factor[c];
-        if (plan->output.radial) {
-            const double square = displacement(job, i, j, d);
-            double along = 0.0;
-            for (int c = 0; c < 3; c++)
-                along += d[c] * t[c];
-            for (int c = 0; c < 3; c++)
-                t[c] = along / square * d[c];
+        const int32_t *source = job->rows->source->low[c];
+        const uint32_t here = (uint32_t)job->rows->query->low[c][i];
+        for (size_t k = 0; k < b->count; k++) {
+            d[c][k] = (double)(int32_t)((uint32_t)source[b->neighbor[k]] - here);
+            square[k] += d[c][k] * d[c][k];
         }
     }
+}
+
+/* Terms turned to lie along the lines between the particles. */
+static void make_central(const pair_job *job, size_t i, const batch *b, double t[3][BATCH])
+{
+    double d[3][BATCH], square[BATCH];
+    displacements(job, i, b, d, square);
+    for (size_t k = 0; k < b->count; k++) {
+        const double along = d[0][k] * t[0][k] + d[1][k] * t[1][k] + d[2][k] * t[2][k];
+        const double share = along / square[k];
+        for (int c = 0; c < 3; c++)
+            t[c][k] = share * d[c][k];
+    }
+}
+
+/* Impulses on row i from the neighbours of the batch in quanta, before rounding. */
+static void impulses_of(const pair_job *job, size_t i, const batch *b, double t[3][BATCH])
+{
+    const ascc_plan *plan = job->run->network->plan;
+    const double *factor = job->scale->factor;
+    if (job->share) {
+        double square[BATCH];
+        displacements(job, i, b, t, square);
+        for (size_t k = 0; k < b->count; k++) {
+            const double share = (double)b->strength[k] * factor[0] / sqrt(square[k]);
+            for (int c = 0; c < 3; c++)
+                t[c][k] *= share;
+        }
+    } else {
+        for (int c = 0; c < 3; c++)
+            for (size_t k = 0; k < b->count; k++)
+                t[c][k] = c < plan->dimension ? (double)b->term[k][c] * factor[c] : 0.0;
+        if (plan->output.radial)
+            make_central(job, i, b, t);
+    }
+    double mass[BATCH];
+    for (size_t k = 0; k < b->count; k++)
+        mass[k] = job->uniform ? job->mass[i] : pair_mass(job->mass[i], job->mass[b->neighbor[k]]);
     for (int c = 0; c < 3; c++)
-        impulse[c] = t[c] * mass;
+        for (size_t k = 0; k < b->count; k++)
+            t[c][k] *= mass[k];
+}
+
+/* Nearest integers, ties to even: the low bits of x + 1.5 * 2^52 for |x| < 2^51. False when a value
+ * is beyond what one pair may give. */
+static bool round_all(const double *x, size_t count, int64_t *quanta)
+{
+    int64_t zero;
+    const double magic = ROUND_MAGIC;
+    memcpy(&zero, &magic, sizeof zero);
+    int good = 1;
+    for (size_t k = 0; k < count; k++) {
+        const double shifted = x[k] + ROUND_MAGIC;
+        int64_t bits;
+        memcpy(&bits, &shifted, sizeof bits);
+        quanta[k] = bits - zero;
+        good &= fabs(x[k]) < ASCC_IMPULSE_LIMIT;
+    }
+    return good;
 }
 
 /* What the last layer reads. */
@@ -124,21 +162,24 @@ static void evaluate_kernel(const pair_job *job, size_t i, batch *b)
 static void flush(pair_job *job, size_t i, batch *b)
 {
     const size_t d = (size_t)job->run->network->plan->dimension;
+    double impulse[3][BATCH];
+    int64_t quanta[BATCH];
+    b->pairs += b->count;
     evaluate_kernel(job, i, b);
-    for (size_t k = 0; k < b->count; k++) {
-        const size_t j = b->neighbor[k];
-        double impulse[3];
-        impulse_of(job, i, b, k, impulse);
-        for (size_t c = 0; c < d; c++) {
-            if (!(fabs(impulse[c]) < ASCC_IMPULSE_LIMIT)) {
-                note_bad_row(job, i);
-                continue;
-            }
-            const int64_t quanta = (int64_t)((impulse[c] + ROUND_MAGIC) - ROUND_MAGIC);
-            if (!add_impulse(&job->sum[i * d + c], quanta) ||
-                !add_impulse(&job->sum[j * d + c], -quanta))
-                note_bad_row(job, i);
+    impulses_of(job, i, b, impulse);
+    for (size_t c = 0; c < d; c++) {
+        if (!round_all(impulse[c], b->count, quanta)) {
+            note_bad_row(job, i);
+            break;
         }
+        int64_t own = 0; /* 64 impulses below 2^50 */
+        bool good = true;
+        for (size_t k = 0; k < b->count; k++) {
+            own += quanta[k];
+            good &= add_impulse(&job->sum[b->neighbor[k] * d + c], -quanta[k]);
+        }
+        if (!add_impulse(&job->sum[i * d + c], own) || !good)
+            note_bad_row(job, i);
     }
     b->count = 0;
 }
@@ -149,7 +190,7 @@ static void evaluate_row(pair_job *job, size_t i, batch *b)
     const size_t start = rows->start[i];
     for (size_t k = start; k < start + rows->count[i]; k++) {
         const uint32_t j = rows->neighbor[k];
-        if (job->fluid[j] && j <= i)
+        if (j <= i && job->fluid[j])
             continue; /* that pair belongs to row j */
         if (rows->source->low[0][j] == rows->query->low[0][i] &&
             rows->source->low[1][j] == rows->query->low[1][i] &&
@@ -171,10 +212,11 @@ static void evaluate_chunks(void *data, size_t begin, size_t end, int32_t slot)
     for (size_t c = begin; c < end; c++) {
         const size_t first = (c * 3 + job->phase) * job->chunk;
         batch b;
-        b.count = 0;
+        b.count = b.pairs = 0;
         for (size_t i = first; i < ascc_min_size(first + job->chunk, count); i++)
             if (job->fluid[i])
                 evaluate_row(job, i, &b);
+        atomic_fetch_add_explicit(&job->pairs, b.pairs, memory_order_relaxed);
     }
 }
 
@@ -200,29 +242,30 @@ static void compute_shares(void *data, size_t begin, size_t end, int32_t slot)
     }
 }
 
-/* The farthest that two neighbours are apart in the order of rows. */
-static size_t reach_of(const pair_job *job)
+/* The farthest that two neighbours are apart in the order of rows. Where slots are rows, neighbours
+ * ascend, so the first and the last tell. */
+static void measure_rows(void *data, size_t begin, size_t end, int32_t slot)
 {
+    (void)slot;
+    pair_job *job = data;
     const ascc_rows *rows = job->rows;
+    const bool ascending = rows->source_grid->order == NULL;
     size_t reach = 1;
-    for (size_t i = 0; i < rows->query->count; i++)
-        for (size_t k = 0; job->fluid[i] && k < rows->count[i]; k++) {
-            const size_t j = rows->neighbor[rows->start[i] + k];
-            reach = ascc_max_size(reach, j > i ? j - i : i - j);
+    for (size_t i = begin; i < end; i++) {
+        if (!job->fluid[i])
+            continue;
+        const uint32_t *neighbor = rows->neighbor + rows->start[i];
+        const size_t count = rows->count[i], stride = ascending && count > 1 ? count - 1 : 1;
+        for (size_t k = 0; k < count; k += stride) {
+            const size_t j = neighbor[k], apart = j > i ? j - i : i - j;
+            reach = apart > reach ? apart : reach;
         }
-    return reach;
-}
-
-static uint64_t count_pairs(const pair_job *job)
-{
-    const ascc_rows *rows = job->rows;
-    uint64_t pairs = 0;
-    for (size_t i = 0; i < rows->query->count; i++)
-        for (size_t k = 0; job->fluid[i] && k < rows->count[i]; k++) {
-            const size_t j = rows->neighbor[rows->start[i] + k];
-            pairs += !job->fluid[j] || j > i;
-        }
-    return pairs;
+    }
+    size_t seen = atomic_load_explicit(&job->reach, memory_order_relaxed);
+    while (seen < reach &&
+           !atomic_compare_exchange_weak_explicit(&job->reach, &seen, reach, memory_order_relaxed,
+                                                  memory_order_relaxed))
+        ;
 }
 
 /* Host's fluid row of a set row, or fluid_count + boundary row. */
@@ -264,6 +307,9 @@ static ascc_status take_job(pair_job *job, int32_t set, const ascc_impulse_scale
     }
     job->fluid = fluid;
     job->mass = mass;
+    job->uniform = true;
+    for (size_t i = 1; i < h->fluid_count; i++)
+        job->uniform &= scale->mass[i] == scale->mass[0];
     return ASCC_OK;
 }
 
@@ -283,7 +329,8 @@ ascc_status ascc_antisymmetric_impulses(const ascc_network_run *run,
         return status;
     if (job.share)
         ascc_workers_run(run->tools->workers, count, 1024, compute_shares, &job);
-    job.chunk = ascc_max_size(reach_of(&job), SMALLEST_CHUNK);
+    ascc_workers_run(run->tools->workers, count, 1024, measure_rows, &job);
+    job.chunk = ascc_max_size(atomic_load(&job.reach), SMALLEST_CHUNK);
     const size_t chunks = (count + job.chunk - 1) / job.chunk;
     for (job.phase = 0; job.phase < 3 && job.phase < chunks; job.phase++)
         ascc_workers_run(run->tools->workers, (chunks - job.phase + 2) / 3, 1, evaluate_chunks,
@@ -298,7 +345,7 @@ ascc_status ascc_antisymmetric_impulses(const ascc_network_run *run,
             job.fluid[i] ? impulses->fluid + row * d : impulses->wall + (row - h->fluid_count) * d;
         memcpy(to, job.sum + i * d, d * sizeof *to);
     }
-    *pair_count = count_pairs(&job);
+    *pair_count = atomic_load(&job.pairs);
     return ASCC_OK;
 }
 
