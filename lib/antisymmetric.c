@@ -19,6 +19,7 @@ typedef struct pair_job {
     float *share;         /* [set rows][8]: what each row gives each bump of a basis, else NULL */
     size_t chunk, phase;
     atomic_uint_least64_t pairs;
+    atomic_size_t reach;
     atomic_uint_least64_t bad_row; /* 1 + smallest set row with a value that cannot be held */
 } pair_job;
 
@@ -200,29 +201,25 @@ static void compute_shares(void *data, size_t begin, size_t end, int32_t slot)
     }
 }
 
-/* The farthest that two neighbours are apart in the order of rows. */
-static size_t reach_of(const pair_job *job)
+/* Counts the pairs, and how far apart two neighbours are at most in the order of rows. */
+static void survey(void *data, size_t begin, size_t end, int32_t slot)
 {
+    (void)slot;
+    pair_job *job = data;
     const ascc_rows *rows = job->rows;
-    size_t reach = 1;
-    for (size_t i = 0; i < rows->query->count; i++)
+    size_t pairs = 0, reach = 1;
+    for (size_t i = begin; i < end; i++)
         for (size_t k = 0; job->fluid[i] && k < rows->count[i]; k++) {
             const size_t j = rows->neighbor[rows->start[i] + k];
             reach = ascc_max_size(reach, j > i ? j - i : i - j);
-        }
-    return reach;
-}
-
-static uint64_t count_pairs(const pair_job *job)
-{
-    const ascc_rows *rows = job->rows;
-    uint64_t pairs = 0;
-    for (size_t i = 0; i < rows->query->count; i++)
-        for (size_t k = 0; job->fluid[i] && k < rows->count[i]; k++) {
-            const size_t j = rows->neighbor[rows->start[i] + k];
             pairs += !job->fluid[j] || j > i;
         }
-    return pairs;
+    atomic_fetch_add_explicit(&job->pairs, pairs, memory_order_relaxed);
+    size_t seen = atomic_load_explicit(&job->reach, memory_order_relaxed);
+    while (seen < reach &&
+           !atomic_compare_exchange_weak_explicit(&job->reach, &seen, reach, memory_order_relaxed,
+                                                  memory_order_relaxed))
+        ;
 }
 
 /* Host's fluid row of a set row, or fluid_count + boundary row. */
@@ -283,7 +280,8 @@ ascc_status ascc_antisymmetric_impulses(const ascc_network_run *run,
         return status;
     if (job.share)
         ascc_workers_run(run->tools->workers, count, 1024, compute_shares, &job);
-    job.chunk = ascc_max_size(reach_of(&job), SMALLEST_CHUNK);
+    ascc_workers_run(run->tools->workers, count, 1024, survey, &job);
+    job.chunk = ascc_max_size(atomic_load(&job.reach), SMALLEST_CHUNK);
     const size_t chunks = (count + job.chunk - 1) / job.chunk;
     for (job.phase = 0; job.phase < 3 && job.phase < chunks; job.phase++)
         ascc_workers_run(run->tools->workers, (chunks - job.phase + 2) / 3, 1, evaluate_chunks,
@@ -298,7 +296,7 @@ ascc_status ascc_antisymmetric_impulses(const ascc_network_run *run,
             job.fluid[i] ? impulses->fluid + row * d : impulses->wall + (row - h->fluid_count) * d;
         memcpy(to, job.sum + i * d, d * sizeof *to);
     }
-    *pair_count = count_pairs(&job);
+    *pair_count = atomic_load(&job.pairs);
     return ASCC_OK;
 }
 

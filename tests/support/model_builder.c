@@ -489,7 +489,7 @@ unsigned char *model_builder_tiny(double spacing, size_t *size)
                               .bumps = 3,
                               .order = 1,
                               .transfer = 1,
-                              .radius = 2.25,
+                              .radius = 2.0,
                               .channels = 16},
                         .state = 7};
     model_builder_open(&n.builder);
