@@ -470,17 +470,6 @@ static size_t keep_nearest(const ascc_rows *rows, const int32_t at[3], uint32_t 
     return kept;
 }
 
-/* The hat of the box is above 0 here: the same bits as the geometry kernel's. */
-static bool within_box(const ascc_rows *rows, uint32_t row, const int32_t at[3])
-{
-    for (int c = 0; c < 3; c++) {
-        const int32_t d = (int32_t)((uint32_t)rows->source->low[c][row] - (uint32_t)at[c]);
-        if (!(fabsf((float)d * rows->inverse_box) < 1.0f))
-            return false;
-    }
-    return true;
-}
-
 /* Appends the neighbours of one query within a run of slots; false when there are too many. */
 static bool search_run(const rows_job *job, size_t begin, size_t end, const int32_t at[3],
                        uint32_t query, uint32_t *found, size_t *count, distance *heap)
@@ -488,19 +477,19 @@ static bool search_run(const rows_job *job, size_t begin, size_t end, const int3
     const ascc_rows *rows = job->rows;
     const ascc_grid *grid = rows->source_grid;
     const ascc_coordinates points = {grid->low[0], grid->low[1], grid->low[2]};
-    const float limit = (float)(rows->radius * rows->radius);
+    const ascc_kernels *kernels = job->tools->kernels;
+    const bool cube = rows->inverse_cube > 0.0f;
+    const float limit = cube ? rows->inverse_cube : (float)(rows->radius * rows->radius);
     while (begin < end) {
         const size_t stop = ascc_min_size(end, begin + SEARCH_CHUNK);
-        const size_t n = job->tools->kernels->search(&points, begin, stop, at[0], at[1], at[2],
-                                                     limit, found + *count);
+        const size_t n = (cube ? kernels->search_cube : kernels->search)(
+            &points, begin, stop, at[0], at[1], at[2], limit, found + *count);
         uint32_t *fresh = found + *count;
         size_t kept = 0;
         for (size_t k = 0; k < n; k++) {
             const uint32_t row = grid->order ? grid->order[fresh[k]] : fresh[k];
             if (rows->skip_self && rows->source->low[0][row] == at[0] &&
                 rows->source->low[1][row] == at[1] && rows->source->low[2][row] == at[2])
-                continue;
-            if (rows->inverse_box > 0.0f && !within_box(rows, row, at))
                 continue;
             fresh[kept++] = row;
         }

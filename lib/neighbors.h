@@ -93,11 +93,12 @@ double ascc_grid_cell(double radius);
 typedef struct ascc_rows {
     const ascc_points *query, *source;
     const ascc_grid *query_grid, *source_grid;
-    double radius; /* units */
-    bool same;     /* query and source are one set */
+    double radius; /* units; no less than half the edge of the cube below, if there is one */
+    float
+        inverse_cube; /* 1 / half the edge, in units, of a cube searched in place of the ball; 0 = none */
+    bool same;        /* query and source are one set */
     bool skip_self;
-    float inverse_box; /* one over half a cube's edge, whose inside alone counts; 0 = the ball */
-    int32_t limit;     /* nearest neighbours kept, mutual if `same`; 0 = all */
+    int32_t limit;         /* nearest neighbours kept, mutual if `same`; 0 = all */
     int32_t max_neighbors; /* before LIMIT */
     uint32_t *count;       /* [query count]; ASCC_ROW_ABSENT = not made */
     size_t *start;         /* [query count] into neighbor */

@@ -2,6 +2,7 @@
  * SPDX-License-Identifier: MIT */
 #include "network.h"
 
+#include <math.h>
 #include <string.h>
 
 #define WANTS_RAW 1
@@ -32,20 +33,34 @@ static size_t cell_count(const ascc_filter *filter)
 
 /* ---- Prepared once ---- */
 
+/* A radius whose cells serve the search of a cube: one that is searched anyway, if it is little more. */
+static double cube_reach(const ascc_plan *plan, double cube)
+{
+    double reach = INFINITY;
+    for (int32_t t = 0; t <= plan->term_count; t++) {
+        const bool last = t == plan->term_count;
+        const double radius = last ? plan->output.filter.radius : plan->term[t].filter.radius;
+        const bool ball = last || plan->term[t].kind == ASCC_TERM_CONVOLUTION;
+        if (ball && radius >= cube && radius < reach)
+            reach = radius;
+    }
+    return reach <= 1.5 * cube ? reach : cube;
+}
+
 static int32_t find_key(ascc_network *network, int32_t query, int32_t source,
-                        const ascc_filter *filter, bool skip_self, double box)
+                        const ascc_filter *filter, bool skip_self, double cube)
 {
     ascc_rows_key wanted = {.query = query,
                             .source = source,
                             .skip_self = skip_self,
                             .limit = filter->neighbor_limit,
-                            .radius = filter->radius,
-                            .box = box};
+                            .radius = cube > 0.0 ? cube_reach(network->plan, cube) : filter->radius,
+                            .cube = cube};
     int32_t k = 0;
     for (; k < network->key_count; k++) {
         const ascc_rows_key *key = &network->key[k];
         if (key->query == query && key->source == source && key->skip_self == wanted.skip_self &&
-            key->limit == wanted.limit && key->radius == wanted.radius && key->box == box)
+            key->limit == wanted.limit && key->radius == wanted.radius && key->cube == cube)
             break;
     }
     if (k == network->key_count)
@@ -183,7 +198,7 @@ static ascc_status open_rows(ascc_network_run *run)
         rows->same = key->query == key->source;
         rows->skip_self = key->skip_self;
         rows->limit = key->limit;
-        rows->inverse_box = key->box > 0.0 ? (float)(1.0 / (key->box * h->scale.inverse)) : 0.0f;
+        rows->inverse_cube = key->cube > 0.0 ? (float)(h->scale.unit / key->cube) : 0.0f;
         rows->max_neighbors = network->max_neighbors;
         ascc_status status =
             ascc_hierarchy_grid(h, run->tools, key->query, rows->radius, &rows->query_grid);
@@ -374,7 +389,7 @@ ascc_geometry ascc_network_geometry(const ascc_network_run *run, const ascc_rows
     else if (filter->mapping == ASCC_MAPPING_DIRECTION)
         g.pairs.distance = scratch + 3 * room;
     const float inverse =
-        rows->inverse_box > 0.0f ? rows->inverse_box : (float)(1.0 / rows->radius);
+        rows->inverse_cube > 0.0f ? rows->inverse_cube : (float)(1.0 / rows->radius);
     const ascc_points *s = rows->source, *q = rows->query;
     const ascc_coordinates source = {s->low[0], s->low[1], s->low[2]};
     run->tools->kernels->geometry(&source, neighbor, count, q->low[0][query], q->low[1][query],

@@ -15,7 +15,7 @@ typedef struct ascc_rows_key {
     int32_t query, source; /* sets */
     int32_t skip_self, limit;
     double radius;   /* m */
-    double box;      /* m: a transfer's voxel; 0 = the whole ball */
+    double cube;     /* m: a transfer's voxel, half the edge of a cube; 0 = the ball */
     size_t expected; /* neighbours, from the last step */
 } ascc_rows_key;
 
@@ -68,7 +68,7 @@ typedef struct ascc_network_run {
     uint32_t longest;
 } ascc_network_run;
 
-/* Geometry of up to `room` pairs in scratch, for one filter: scaled to its radius, or to its box. */
+/* Geometry of up to `room` pairs in scratch, for one filter: scaled to its radius, or to its cube. */
 typedef struct ascc_geometry {
     ascc_pairs pairs;
     const float *window; /* NULL = 1 */

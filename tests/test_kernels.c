@@ -114,6 +114,37 @@ static void search_finds_the_points_within_the_limit_on_every_cpu(void **state)
     }
 }
 
+static void search_cube_finds_the_points_within_on_every_cpu(void **state)
+{
+    (void)state;
+    ascc_kernels table[16];
+    const int count = tables(table);
+    const float inverse = 1.0f / 7000000.0f;
+    for (size_t n = 0; n < 70; n++) {
+        int32_t x[72], y[72], z[72];
+        for (size_t i = 0; i < n; i++) {
+            x[i] = (int32_t)(next() << 1) / 200;
+            y[i] = (int32_t)(next() << 1) / 200;
+            z[i] = n % 3 ? (int32_t)(next() << 1) / 200 : 0;
+        }
+        if (n > 2) { /* on a face, and just inside */
+            x[1] = 7000000;
+            x[2] = -6999998;
+            y[1] = y[2] = z[1] = z[2] = 0;
+        }
+        const ascc_coordinates points = {x, y, z};
+        for (int t = 0; t < count; t++) {
+            uint32_t found[100];
+            const size_t got = table[t].search_cube(&points, n / 5, n, 0, 0, 0, inverse, found);
+            size_t k = 0;
+            for (size_t i = n / 5; i < n; i++)
+                if (abs(x[i]) < 6999999 && abs(y[i]) < 6999999 && abs(z[i]) < 6999999)
+                    assert_true(k < got && found[k++] == i);
+            assert_int_equal(k, got);
+        }
+    }
+}
+
 static void search_sees_across_the_wrap_of_the_low_words(void **state)
 {
     (void)state;
@@ -600,6 +631,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(search_finds_the_points_within_the_limit_on_every_cpu),
+        cmocka_unit_test(search_cube_finds_the_points_within_on_every_cpu),
         cmocka_unit_test(search_sees_across_the_wrap_of_the_low_words),
         cmocka_unit_test(geometry_has_the_same_bits_on_every_cpu),
         cmocka_unit_test(geometry_of_opposite_displacements_is_opposite),

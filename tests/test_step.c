@@ -812,12 +812,14 @@ static void a_steady_step_allocates_nothing(void **state)
     }
 }
 
-static void each_failing_allocation_leaves_the_particles_as_they_were(void **state)
+static void check_each_failing_allocation(int bumps)
 {
-    (void)state;
     test_memory c = {0};
-    const world_options o =
-        counted(&c, (world_options){.dimension = 3, .walls = true, .random_network = true});
+    const world_options o = counted(&c, (world_options){.dimension = 3,
+                                                        .walls = true,
+                                                        .random_network = true,
+                                                        .bumps = bumps,
+                                                        .transfer = bumps > 0});
     world w = open_world(&o);
     const uint64_t before = ascc_particles_hash(w.particles);
     size_t failures = 0;
@@ -843,6 +845,13 @@ static void each_failing_allocation_leaves_the_particles_as_they_were(void **sta
     assert_true(failures > 30);
     close_world(&w);
     assert_true(test_memory_is_clean(&c));
+}
+
+static void each_failing_allocation_leaves_the_particles_as_they_were(void **state)
+{
+    (void)state;
+    check_each_failing_allocation(0);
+    check_each_failing_allocation(3);
 }
 
 /* A jittered block of side^dimension particles. */

@@ -16,7 +16,7 @@
 #define UNROLL
 #endif
 
-/* A variant may bring a search of its own. */
+/* A variant may bring searches of its own. */
 #ifndef SEARCH
 #define SEARCH search
 static size_t search(const ascc_coordinates *points, size_t begin, size_t end, int32_t x, int32_t y,
@@ -30,6 +30,25 @@ static size_t search(const ascc_coordinates *points, size_t begin, size_t end, i
         const float dz = (float)(int32_t)((uint32_t)points->z[i] - uz);
         found[count] = (uint32_t)i;
         count += dx * dx + dy * dy + dz * dz <= limit;
+    }
+    return count;
+}
+#endif
+
+#ifndef SEARCH_CUBE
+#define SEARCH_CUBE search_cube
+static size_t search_cube(const ascc_coordinates *points, size_t begin, size_t end, int32_t x,
+                          int32_t y, int32_t z, float inverse, uint32_t *RESTRICT found)
+{
+    size_t count = 0;
+    const uint32_t ux = (uint32_t)x, uy = (uint32_t)y, uz = (uint32_t)z;
+    for (size_t i = begin; i < end; i++) {
+        const float dx = fabsf((float)(int32_t)((uint32_t)points->x[i] - ux) * inverse);
+        const float dy = fabsf((float)(int32_t)((uint32_t)points->y[i] - uy) * inverse);
+        const float dz = fabsf((float)(int32_t)((uint32_t)points->z[i] - uz) * inverse);
+        const float xy = dx > dy ? dx : dy;
+        found[count] = (uint32_t)i;
+        count += (xy > dz ? xy : dz) < 1.0f;
     }
     return count;
 }
@@ -504,6 +523,7 @@ static void pair_terms(const ascc_pairs *pairs, const float *window, const uint3
 void ASCC_VARIANT(ascc_kernels *kernels)
 {
     kernels->search = SEARCH;
+    kernels->search_cube = SEARCH_CUBE;
     kernels->geometry = geometry;
     kernels->gather = gather;
     kernels->basis = basis;

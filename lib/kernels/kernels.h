@@ -33,6 +33,10 @@ typedef struct ascc_kernels {
     size_t (*search)(const ascc_coordinates *points, size_t begin, size_t end, int32_t x, int32_t y,
                      int32_t z, float limit, uint32_t *found);
 
+    /* The same of those within a cube: all of |x|, |y|, |z| times inverse below 1, the hat above 0. */
+    size_t (*search_cube)(const ascc_coordinates *points, size_t begin, size_t end, int32_t x,
+                          int32_t y, int32_t z, float inverse, uint32_t *found);
+
     /* pairs[k] of the displacements neighbour[k] - (x, y, z), scaled by inverse_radius into the unit
      * ball and mapped to the cube (or to directions). mapping is an ascc_mapping. */
     void (*geometry)(const ascc_coordinates *points, const uint32_t *neighbor, size_t k, int32_t x,

@@ -6,6 +6,7 @@
  *   'f'  a whole file
  *   'h'  a header; what follows a byte 0xff is the data
  *   'n'  the network of a file of libascc's own, whose tensors are right for the corpus
+ *   'b'  the same of one in a basis, with transfers and BF16 tensors
  *   'd'  the architecture of a published DMCF network, likewise
  *   'c'  that of a published CConv network
  */
@@ -50,7 +51,7 @@ static void check_plan(const ascc_plan *plan)
             require(term->column >= 0 && term->column + term->outputs <= layer->channels);
             if (term->kind == ASCC_TERM_CONVOLUTION)
                 read_all(term->weight, cell_count(&term->filter) * pairs);
-            else if (term->kind == ASCC_TERM_DENSE)
+            else if (term->kind != ASCC_TERM_IDENTITY)
                 read_all(term->weight, pairs);
             if (term->bias)
                 read_all(term->bias, (size_t)term->outputs);
@@ -59,8 +60,8 @@ static void check_plan(const ascc_plan *plan)
     const ascc_output *output = &plan->output;
     require(output->source >= 0 && output->source < plan->layer_count + 2);
     if (output->kind == ASCC_OUTPUT_ANTISYMMETRIC)
-        read_all(output->weight,
-                 cell_count(&output->filter) * (size_t)output->inputs * (size_t)plan->dimension);
+        read_all(output->weight, cell_count(&output->filter) * (size_t)output->inputs *
+                                     (size_t)(output->filter.bumps ? 1 : plan->dimension));
 }
 
 static void load(const void *bytes, size_t size)
@@ -128,6 +129,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
         load_header(data + 1, size - 1);
         break;
     case 'n':
+    case 'b':
     case 'd':
     case 'c':
         load_text(data + 1, size - 1, (char)data[0]);

@@ -55,7 +55,7 @@ int main(int argc, char **argv)
         "{\"\\ud83d\\ude00\\u00e9\\n\":[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[]",
         "{\"a\":[1e308,-0.1e-320,123456789012345678901234567890,5e-324,true,false,null]}",
     };
-    static const char kinds[] = {'n', 'd', 'c'};
+    static const char kinds[] = {'n', 'b', 'd', 'c'};
     const model_random tiny = {.channels = 4, .cells = 1, .output_cells = 2, .trunk_layers = 1};
     const model_random farthest = {.levels = 2,
                                    .channels = 4,

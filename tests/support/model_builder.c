@@ -489,7 +489,7 @@ unsigned char *model_builder_tiny(double spacing, size_t *size)
                               .bumps = 3,
                               .order = 1,
                               .transfer = 1,
-                              .radius = 2.25,
+                              .radius = 2.0,
                               .channels = 16},
                         .state = 7};
     model_builder_open(&n.builder);
@@ -657,12 +657,14 @@ unsigned char *model_builder_cconv(const char *from, const char *to, size_t *siz
 
 static const model_random small = {
     .levels = 2, .channels = 4, .cells = 2, .output_cells = 2, .neighbor_limit = 8};
+static const model_random small_basis = {
+    .levels = 2, .channels = 4, .bumps = 2, .order = 1, .transfer = 1, .type = "BF16"};
 
 unsigned char *model_builder_described(char kind, const char *text, size_t *size)
 {
     return kind == 'd'   ? model_builder_dmcf(dmcf_architecture, text, size)
            : kind == 'c' ? model_builder_cconv(cconv_architecture, text, size)
-                         : random_file(&small, text, NULL, size);
+                         : random_file(kind == 'b' ? &small_basis : &small, text, NULL, size);
 }
 
 char *model_builder_description(char kind)
@@ -670,7 +672,7 @@ char *model_builder_description(char kind)
     model_text text = {NULL, 0, 0};
     size_t size;
     if (kind != 'd' && kind != 'c') {
-        free(random_file(&small, NULL, &text.text, &size));
+        free(random_file(kind == 'b' ? &small_basis : &small, NULL, &text.text, &size));
         return text.text;
     }
     model_text_add(&text, "%s", kind == 'd' ? dmcf_architecture : cconv_architecture);

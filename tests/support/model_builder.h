@@ -93,7 +93,7 @@ unsigned char *model_builder_dmcf(const char *from, const char *to, size_t *size
 unsigned char *model_builder_cconv(const char *from, const char *to, size_t *size);
 
 /* For fuzzing: a file with the tensors of a small network and another description of it. kind 'n':
- * own format, two levels; 'd', 'c': published. model_builder_description gives the right one, which
+ * own format, two levels; 'b': the same in a basis; 'd', 'c': published. model_builder_description gives the right one, which
  * is the caller's to free. */
 unsigned char *model_builder_described(char kind, const char *text, size_t *size);
 char *model_builder_description(char kind);
