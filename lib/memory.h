@@ -32,7 +32,7 @@ bool ascc_grow(const ascc_allocator *allocator, void **memory, size_t *capacity,
  *
  *   block:  [ piece | piece | piece |      free      ]    reset: used = 0
  *   what does not fit goes into overflow blocks; reset replaces block and overflow by one block of
- *   1.25 times what was needed, so a steady user allocates nothing.
+ *   1.125 times what was needed, so a steady user allocates nothing.
  */
 typedef struct ascc_arena_overflow ascc_arena_overflow;
 
