@@ -16,9 +16,34 @@
 
 static const double still[3] = {0.0, 0.0, 0.0};
 
+/* Fluid starts a spacing off the walls, as in the data that networks learn from. */
+static const double corner[3] = {0.5, 0.5, 0.5};
+
+static world tank(double spacing, const int cells[3], const int edges[3])
+{
+    world w = world_empty(spacing);
+    world_box(&w, edges);
+    world_block(&w, (double[]){corner[0] * spacing, corner[1] * spacing, corner[2] * spacing},
+                cells, still);
+    return w;
+}
+
+static world dam(double spacing)
+{
+    return tank(spacing, (int[]){7, 8, 7}, (int[]){24, 14, 8});
+}
+
+static world column(void)
+{
+    return tank(SPACING, (int[]){6, 10, 6}, (int[]){7, 16, 7});
+}
+
+/* What a fall through the column's box ends with. */
+#define FALL sqrt(2.0 * G * 16 * SPACING)
+
 /* ---- A dam break, as it is and with what nobody trained -------------------------------------- */
 
-/* Kinetic energy may exceed the potential energy released by 1 % of what there is to release. */
+/* Kinetic energy may exceed the potential energy released by 5 % of what there is to release. */
 static void break_dam(cell *c, world w)
 {
     simulation s;
@@ -27,9 +52,9 @@ static void break_dam(cell *c, world w)
     while (good && cell_step(c, &s)) {
         const ascc_measure_motion_sums m = cell_motion(&s);
         good = cell_nothing_escapes(c, &s) && cell_nothing_clumps(c, &s);
-        if (good && m.kinetic > start - m.potential + 0.01 * start)
-            good = cell_fail(c, "kinetic energy %.2g x what was released",
-                             m.kinetic / (start - m.potential));
+        if (good && m.kinetic > start - m.potential + 0.05 * start)
+            good = cell_fail(c, "energy %+.0f %% of the potential",
+                             100.0 * (m.kinetic + m.potential - start) / start);
     }
     cell_close(c, &s);
     world_free(&w);
@@ -37,51 +62,54 @@ static void break_dam(cell *c, world w)
 
 static void dam_break(cell *c)
 {
-    break_dam(c, world_named("dam-break", 8, SPACING));
+    break_dam(c, dam(SPACING));
 }
 
 static void short_step(cell *c)
 {
-    world w = world_named("dam-break", 8, SPACING);
+    world w = dam(SPACING);
     w.scene.time_step *= 0.5;
     break_dam(c, w);
 }
 
 static void long_step(cell *c)
 {
-    world w = world_named("dam-break", 8, SPACING);
+    world w = dam(SPACING);
     w.scene.time_step *= 2.0;
     break_dam(c, w);
 }
 
 static void fine(cell *c)
 {
-    break_dam(c, world_named("dam-break", 8, 0.5 * SPACING));
+    break_dam(c, dam(0.5 * SPACING));
 }
 
 static void coarse(cell *c)
 {
-    break_dam(c, world_named("dam-break", 8, 2.0 * SPACING));
+    break_dam(c, dam(2.0 * SPACING));
 }
 
 /* ---- At rest --------------------------------------------------------------------------------- */
 
 static void still_column(cell *c)
 {
-    world w = world_named("still-column", 8, SPACING);
+    world w = column();
     simulation s;
     bool good = cell_open(c, &w, &s);
-    const double start = cell_motion(&s).center[1];
     double kinetic = 0.0; /* greatest in the last tenth */
+    double middle = NAN;  /* height half way */
     while (good && cell_step(c, &s)) {
-        good = cell_nothing_escapes(c, &s) && cell_slower_than(c, &s, sqrt(2.0 * G * 12 * SPACING));
+        good = cell_nothing_escapes(c, &s) && cell_slower_than(c, &s, FALL);
+        if (s.frame == c->frames / 2)
+            middle = cell_motion(&s).center[1];
         if (s.frame > c->frames - c->frames / 10)
             kinetic = fmax(kinetic, cell_motion(&s).kinetic);
     }
     if (good && cell_complete(c, &s)) {
         const ascc_measure_motion_sums m = cell_motion(&s);
-        if (fabs(m.center[1] / start - 1.0) > 0.01)
-            cell_fail(c, "height %+.1f %%", 100.0 * (m.center[1] / start - 1.0));
+        const double change = m.center[1] / middle - 1.0;
+        if (fabs(change) > 0.01)
+            cell_fail(c, "height %+.1f %% in the second half", 100.0 * change);
         else if (kinetic > 1e-4 * m.potential)
             cell_fail(c, "kinetic / potential %.1e", kinetic / m.potential);
     }
@@ -172,7 +200,7 @@ static void compare(cell *c, const simulation *s, const simulation *t)
 
 static void mapped(cell *c, world_map *map, world_map *back)
 {
-    world w = world_named("dam-break", 8, SPACING), other = world_copy(&w);
+    world w = dam(SPACING), other = world_copy(&w);
     simulation s, t;
     world_apply(&other, map);
     bool good = cell_open(c, &w, &s);
@@ -229,7 +257,7 @@ static void bits(cell *c, world *w, world *other, bool reverse)
 
 static void order(cell *c)
 {
-    world w = world_named("dam-break", 8, SPACING), other = world_copy(&w);
+    world w = dam(SPACING), other = world_copy(&w);
     const size_t n = w.scene.fluid_count;
     for (size_t i = 0; i < n; i++)
         memcpy(other.position + 3 * i, w.position + 3 * (n - 1 - i), 3 * sizeof(double));
@@ -238,7 +266,7 @@ static void order(cell *c)
 
 static void far_particle(cell *c)
 {
-    world w = world_named("dam-break", 8, SPACING), other = world_copy(&w);
+    world w = dam(SPACING), other = world_copy(&w);
     world_add(&other, (double[]){500.0 * SPACING, 1.0, 0.0}, still);
     bits(c, &w, &other, false);
 }
@@ -268,38 +296,38 @@ static void jet(cell *c)
 
 static void emission(cell *c)
 {
-    world w = world_named("still-column", 8, SPACING);
+    world w = column();
     simulation s;
     /* the middle of the lattice's cells, where there is fluid */
-    world_block(&w, (double[]){SPACING, 3 * SPACING, SPACING}, (int[]){2, 2, 2}, still);
+    world_block(&w, (double[]){2 * SPACING, 4 * SPACING, 2 * SPACING}, (int[]){2, 2, 2}, still);
     bool good = cell_open(c, &w, &s);
     while (good && cell_step(c, &s))
-        good = cell_nothing_escapes(c, &s) && cell_slower_than(c, &s, sqrt(2.0 * G * 12 * SPACING));
+        good = cell_nothing_escapes(c, &s) && cell_slower_than(c, &s, FALL);
     cell_close(c, &s);
     world_free(&w);
 }
 
 static void coincident(cell *c)
 {
-    world w = world_named("still-column", 8, SPACING);
+    world w = column();
     simulation s;
     memcpy(w.position, w.position + 3, 3 * sizeof(double));
     bool good = cell_open(c, &w, &s);
     while (good && cell_step(c, &s))
-        good = cell_nothing_escapes(c, &s) && cell_slower_than(c, &s, sqrt(2.0 * G * 12 * SPACING));
+        good = cell_nothing_escapes(c, &s) && cell_slower_than(c, &s, FALL);
     cell_close(c, &s);
     world_free(&w);
 }
 
 static void single(cell *c)
 {
-    world w = world_named("still-column", 8, SPACING);
+    world w = column();
     simulation s;
     w.scene.fluid_count = 0;
-    world_add(&w, (double[]){2 * SPACING, 8 * SPACING, 2 * SPACING}, still);
+    world_add(&w, (double[]){3 * SPACING, 12 * SPACING, 3 * SPACING}, still);
     bool good = cell_open(c, &w, &s);
     while (good && cell_step(c, &s))
-        good = cell_nothing_escapes(c, &s) && cell_slower_than(c, &s, sqrt(2.0 * G * 12 * SPACING));
+        good = cell_nothing_escapes(c, &s) && cell_slower_than(c, &s, FALL);
     cell_close(c, &s);
     world_free(&w);
 }
@@ -307,7 +335,8 @@ static void single(cell *c)
 /* ---- The table ------------------------------------------------------------------------------- */
 
 #define DAM                                                                                        \
-    "no escape; pairs below spacing / 5 at most 0.1 %; kinetic at most what was released + 1 %"
+    "no escape; pairs below spacing / 5 at most 0.1 %; kinetic at most what was released + 5 % "   \
+    "of what there is"
 
 const stability_scene stability_scenes[] = {
     {"dam break", DAM, 60, 3200, dam_break},
@@ -316,9 +345,9 @@ const stability_scene stability_scenes[] = {
     {"spacing x 0.5", DAM, 40, 400, fine},
     {"spacing x 2", DAM, 40, 400, coarse},
     {"still column",
-     "no escape; height of the centre within 1 % at the end; kinetic / potential below 1e-4 in the "
-     "last tenth",
-     60, 10000, still_column},
+     "no escape; height of the centre changes by less than 1 % in the second half; kinetic / "
+     "potential below 1e-4 in the last tenth",
+     200, 10000, still_column},
     {"zero gravity blob", "centre fixed to 1e-5 spacings, reach grows by less than a spacing", 60,
      1000, blob},
     {"rotating drop", "angular momentum within 1 %", 60, 500, rotating_drop},

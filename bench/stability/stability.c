@@ -24,7 +24,7 @@ static const char *const methods[][2] = {
     {"CConv", "@/data/weights/cconv-liquid3d.safetensors"},
     {"demo", "demo"},
     {"SPH", "sph:cs=25"},
-    {"SPH, step x 4", "sph:cs=25,courant=2"},
+    {"SPH, step x 8", "sph:cs=25,courant=4"},
     {"PBF", "pbf:iterations=4,substeps=4"},
     {"ballistic", "ballistic"},
 };

@@ -6,7 +6,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "scenes.h"
+/* Of wall points, in particle spacings: what the published networks were trained with. */
+#define WALL_SPACING 0.64
 
 /* A bench gives up where memory does. */
 static double *more(double *array, size_t rows)
@@ -70,26 +71,22 @@ static void add_wall(world *w, const double position[3], const double normal[3])
     refer(w);
 }
 
-world world_named(const char *name, int size, double spacing)
+void world_box(world *w, const int edges[3])
 {
-    world w = world_empty(spacing);
-    ascc_sequence s;
-    char error[256];
-    if (!ascc_scene_make(name, 3, size, spacing, &s, error, sizeof error)) {
-        fprintf(stderr, "stability: %s\n", error);
-        exit(1);
+    for (int axis = 0; axis < 3; axis++) {
+        const int p = (axis + 1) % 3, q = (axis + 2) % 3;
+        const int m = (int)ceil(edges[p] / WALL_SPACING), n = (int)ceil(edges[q] / WALL_SPACING);
+        for (int side = 0; side < 2; side++)
+            for (int j = 0; j < m; j++)
+                for (int k = 0; k < n; k++) {
+                    double x[3], normal[3] = {0.0, 0.0, 0.0};
+                    x[axis] = side * edges[axis] * w->scene.spacing;
+                    x[p] = (j + 0.5) * edges[p] * w->scene.spacing / m;
+                    x[q] = (k + 0.5) * edges[q] * w->scene.spacing / n;
+                    normal[axis] = side ? -1.0 : 1.0;
+                    add_wall(w, x, normal);
+                }
     }
-    memcpy(w.scene.gravity, s.gravity, sizeof w.scene.gravity);
-    for (size_t i = 0; i < s.count; i++) {
-        const float *x = s.position + 3 * i, *v = s.velocity + 3 * i;
-        world_add(&w, (double[]){x[0], x[1], x[2]}, (double[]){v[0], v[1], v[2]});
-    }
-    for (size_t i = 0; i < s.walls; i++) {
-        const float *x = s.wall + 3 * i, *n = s.normal + 3 * i;
-        add_wall(&w, (double[]){x[0], x[1], x[2]}, (double[]){n[0], n[1], n[2]});
-    }
-    ascc_sequence_free(&s);
-    return w;
 }
 
 static double *duplicate(const double *array, size_t rows)
@@ -135,7 +132,7 @@ void world_ball(world *w, double radius)
 
 void world_sheet(world *w, double half)
 {
-    const double step = 0.64 * w->scene.spacing; /* as scenes.c */
+    const double step = WALL_SPACING * w->scene.spacing;
     for (double y = -half; y <= half; y += step)
         for (double z = -half; z <= half; z += step)
             add_wall(w, (double[]){0.0, y, z}, (double[]){1.0, 0.0, 0.0});

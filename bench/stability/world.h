@@ -11,8 +11,6 @@ typedef struct world {
 
 /* Without fluid and walls: gravity along -y, frames of 0.02 s. */
 world world_empty(double spacing);
-/* A scene of `ascc sim`, `size` particles along its longest edge. */
-world world_named(const char *name, int size, double spacing);
 world world_copy(const world *w);
 void world_free(world *w);
 
@@ -22,6 +20,9 @@ void world_block(world *w, const double low[3], const int cells[3], const double
 void world_ball(world *w, double radius);
 /* A one-layer wall in the plane x = 0, fluid at x > 0: [-half, half] in y and z. */
 void world_sheet(world *w, double half);
+
+/* The walls of a closed box from the origin, its edges so many spacings. */
+void world_box(world *w, const int edges[3]);
 
 /* Turned world: y becomes x, z becomes y, x becomes z. Upside down: y becomes -y. On one row of three
  * numbers and on a whole world; back undoes. */

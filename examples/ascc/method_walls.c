@@ -3,7 +3,7 @@
  *     o   o   o   fluid
  *   . . . . . . . wall points of the scene, dense, one layer
  *     x   x   x   layer 0: cells of a lattice that starts in the walls' low corner,
- *     x   x   x   layer 1  each moved along the normal to the middle of its layer
+ *     x   x   x   layer 1  moved along the normal to the middle of their layer, but for edges
  */
 #include <math.h>
 #include <stdio.h>
@@ -76,8 +76,9 @@ static bool place(lattice *l, double point[3])
     const double behind = l->outside / l->weight;
     if (!(length > 0.3) || !(behind < l->layers * s))
         return false;
-    const double straight = behind / length;
-    if (square - straight * straight > s * s) /* not behind the wall but beside it */
+    if (length < 0.95) /* beyond an edge: the lattice as it is */
+        return true;
+    if (square - behind * behind > s * s) /* not behind the wall but beside it */
         return false;
     const double shift = ((floor(behind / s) + 0.5) * s - behind) / length;
     for (int c = 0; c < l->scene->dimension; c++)
