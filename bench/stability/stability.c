@@ -218,7 +218,7 @@ static void svg_text(FILE *f, int x, int y, const char *style, const char *text,
 
 static void write_svg(FILE *f, const suite *s, const board *b)
 {
-    enum { WIDE = 164, HIGH = 38, LEFT = 140, TOP = 34 };
+    enum { WIDE = 190, HIGH = 38, LEFT = 140, TOP = 34 };
     static const char *const colour[] = {"#b7e1b0", "#f4b6ae", "#f7e6a4"};
     const int width = LEFT + WIDE * (int)s->method_count + 10,
               height = TOP + HIGH * (int)s->scene_count + 34;
@@ -252,7 +252,7 @@ static void write_svg(FILE *f, const suite *s, const board *b)
                 snprintf(first, sizeof first, "%.60s", c->text);
             else
                 snprintf(first, sizeof first, "%ld of %ld frames", c->frame, c->frames);
-            svg_text(f, x + 7, y + 30, "fill=\"#444\"", first, 27);
+            svg_text(f, x + 7, y + 30, "fill=\"#444\"", first, 36);
         }
     }
     svg_text(

@@ -70,7 +70,7 @@ static bool method_pbf_open(const char *settings, const ascc_method_scene *scene
     m->velocity = malloc((scene->fluid_count + 1) * (size_t)scene->dimension * sizeof *m->velocity);
     if (!m->velocity || !make_solver(m, settings, error) ||
         !ascc_method_layers(scene, m->spacing, LAYERS, &m->wall, &m->wall_count, error) ||
-        pbf_set_walls(m->solver, m->wall_count, m->wall) != ASCC_OK) {
+        (m->wall_count && pbf_set_walls(m->solver, m->wall_count, m->wall) != ASCC_OK)) {
         method_pbf_close(m);
         return false;
     }

@@ -105,7 +105,8 @@ static bool sph_set(void *state, const double *position, const double *velocity,
         options.sound_speed = sound_speed(m, position, m->velocity);
     sph_destroy(&m->solver);
     m->solver = sph_create(&options);
-    if (m->solver && sph_set_walls(m->solver, m->wall_count, m->wall) == ASCC_OK &&
+    if (m->solver &&
+        (!m->wall_count || sph_set_walls(m->solver, m->wall_count, m->wall) == ASCC_OK) &&
         sph_set_fluid(m->solver, scene->fluid_count, position, m->velocity) == ASCC_OK)
         return true;
     snprintf(error->text, sizeof error->text, "%.200s",
