@@ -22,18 +22,6 @@ typedef struct options {
     bool quiet;
 } options;
 
-/* The method that a word means, and the settings in it; NULL if there is none. */
-static const ascc_method *find_method(const char *word, const char **settings)
-{
-    for (size_t k = 0; ascc_methods[k]; k++) {
-        const size_t length = strlen(ascc_methods[k]->prefix);
-        *settings = word + length;
-        if (strncmp(word, ascc_methods[k]->prefix, length) == 0)
-            return ascc_methods[k];
-    }
-    return NULL;
-}
-
 static int usage(FILE *file)
 {
     fputs("ascc eval METHOD SEQUENCE... [options]\n"
@@ -151,7 +139,7 @@ int ascc_command_eval(int argc, char **argv)
     if (!read_arguments(argc, argv, &o))
         return usage(stderr);
     const char *settings;
-    const ascc_method *method = find_method(o.method, &settings);
+    const ascc_method *method = ascc_method_find(o.method, &settings);
     if (!method) {
         fprintf(stderr, "ascc eval: %s: no such method\n", o.method);
         return 2;

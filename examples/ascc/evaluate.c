@@ -26,6 +26,17 @@ enum {
     SUBSET = 2000 /* particles of an exact assignment where all are too many */
 };
 
+const ascc_method *ascc_method_find(const char *word, const char **settings)
+{
+    for (size_t k = 0; ascc_methods[k]; k++) {
+        const size_t length = strlen(ascc_methods[k]->prefix);
+        *settings = word + length;
+        if (strncmp(word, ascc_methods[k]->prefix, length) == 0)
+            return ascc_methods[k];
+    }
+    return NULL;
+}
+
 /* ---- The truth ------------------------------------------------------------------------------- */
 
 static double *to_double(const float *values, size_t count)

@@ -6,6 +6,9 @@
 #include "method.h"
 #include "report.h"
 
+/** The method that a word means, and the settings in it; NULL if there is none. */
+const ascc_method *ascc_method_find(const char *word, const char **settings);
+
 /** A sequence in double, and the scene that a method sees. */
 typedef struct ascc_truth {
     ascc_method_scene scene;

@@ -57,6 +57,6 @@ typedef struct ascc_method {
 /** All methods, NULL at the end: a word means the first whose prefix it begins with. */
 extern const ascc_method *const ascc_methods[];
 
-extern const ascc_method ascc_method_ballistic, ascc_method_model;
+extern const ascc_method ascc_method_ballistic, ascc_method_sph, ascc_method_pbf, ascc_method_model;
 
 #endif

@@ -1,4 +1,4 @@
-/* A model file as a method, run by libascc.
+/* A model file, or the demonstration model, as a method, run by libascc.
  * SPDX-License-Identifier: MIT */
 #include <math.h>
 #include <stdio.h>
@@ -6,6 +6,7 @@
 
 #include <ascc/ascc.h>
 
+#include "host.h"
 #include "method.h"
 
 typedef struct learned {
@@ -42,7 +43,8 @@ static bool learned_load(learned *m, const char *path, ascc_method_error *error)
                                           .thread_count = m->scene->threads};
     ascc_model_info info = {.size = sizeof info};
     if (ascc_context_create(&options, &m->context) != ASCC_OK ||
-        ascc_model_load(m->context, path, &m->model) != ASCC_OK)
+        ascc_host_model(m->context, path, m->scene->dimension, m->scene->spacing, &m->model) !=
+            ASCC_OK)
         return context_failed(m, "model", error);
     (void)ascc_model_get_info(m->model, &info);
     if (info.dimension != m->scene->dimension) {
@@ -145,7 +147,7 @@ static void learned_impulses(const void *state, double external[3], double wall[
 
 const ascc_method ascc_method_model = {
     .prefix = "",
-    .help = "FILE           a model file, run by libascc",
+    .help = "FILE           a model file, run by libascc; demo: the demonstration model",
     .open = learned_open,
     .set = learned_set,
     .advance = learned_advance,

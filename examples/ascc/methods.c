@@ -3,6 +3,8 @@
 
 const ascc_method *const ascc_methods[] = {
     &ascc_method_ballistic,
+    &ascc_method_sph,
+    &ascc_method_pbf,
     &ascc_method_model, /* takes every word: last */
     NULL,
 };

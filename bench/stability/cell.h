@@ -1,0 +1,52 @@
+/* One cell of the stability matrix: a method in a scene, until it fails, is done or out of time.
+ * SPDX-License-Identifier: MIT */
+#ifndef STABILITY_CELL_H
+#define STABILITY_CELL_H
+
+#include "measures.h"
+#include "world.h"
+
+typedef enum verdict { PASS = 0, FAIL = 1, CUT = 2 /* no failure until the time was up */ } verdict;
+
+typedef struct cell {
+    const ascc_method *method;
+    const char *settings;
+    long frames;          /* wanted */
+    long frame;           /* run: of the longest simulation of the scene */
+    double budget, start; /* CPU seconds */
+    verdict verdict;
+    char text[128]; /* why it failed */
+} cell;
+
+/* A running simulation of a world, which must outlive it. */
+typedef struct simulation {
+    const world *world;
+    void *state;
+    long frame;
+    double *position, *velocity;
+} simulation;
+
+/* Calls the cell failed, if it is not yet; returns false. */
+bool cell_fail(cell *c, const char *format, ...)
+#if defined(__GNUC__)
+    __attribute__((format(printf, 2, 3)))
+#endif
+    ;
+
+/* False: the method refused the world, and the cell has failed. Close either way. */
+bool cell_open(cell *c, const world *w, simulation *s);
+/* One frame. False: the cell has failed (a step that fails, a number that is not finite), has run all
+ * its frames, or is out of time. */
+bool cell_step(cell *c, simulation *s);
+void cell_close(cell *c, simulation *s);
+/* Whether all frames were run without a failure: what is asked of the end can be asked. */
+bool cell_complete(const cell *c, const simulation *s);
+
+ascc_measure_motion_sums cell_motion(const simulation *s);
+/* Nothing beyond the walls by half a spacing. */
+bool cell_nothing_escapes(cell *c, const simulation *s);
+/* At most one in 1,000 pairs nearer than a fifth of the spacing. */
+bool cell_nothing_clumps(cell *c, const simulation *s);
+bool cell_slower_than(cell *c, const simulation *s, double speed);
+
+#endif

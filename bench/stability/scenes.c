@@ -1,0 +1,367 @@
+/* The scenes of the stability suite: each where methods like these are known to fail, each with a pass
+ * line that is a number. SPDX-License-Identifier: MIT
+ *
+ * A scene makes a world, steps a simulation of it as long as the cell lets it, and fails the cell where
+ * the line is crossed.
+ */
+#include "suite.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#define SPACING 0.05 /* m, what the published networks were trained with */
+#define G 9.81
+
+static const double still[3] = {0.0, 0.0, 0.0};
+
+/* Fluid starts a spacing off the walls, as in the data that networks learn from. */
+static const double corner[3] = {0.5, 0.5, 0.5};
+
+static world tank(double spacing, const int cells[3], const int edges[3])
+{
+    world w = world_empty(spacing);
+    world_box(&w, edges);
+    world_block(&w, (double[]){corner[0] * spacing, corner[1] * spacing, corner[2] * spacing},
+                cells, still);
+    return w;
+}
+
+static world dam(double spacing)
+{
+    return tank(spacing, (int[]){7, 8, 7}, (int[]){24, 14, 8});
+}
+
+static world column(void)
+{
+    return tank(SPACING, (int[]){6, 10, 6}, (int[]){7, 16, 7});
+}
+
+/* What a fall through the column's box ends with. */
+#define FALL sqrt(2.0 * G * 16 * SPACING)
+
+/* ---- A dam break, as it is and with what nobody trained -------------------------------------- */
+
+/* Kinetic energy may exceed the potential energy released by 5 % of what there is to release. */
+static void break_dam(cell *c, world w)
+{
+    simulation s;
+    bool good = cell_open(c, &w, &s);
+    const double start = cell_motion(&s).potential;
+    while (good && cell_step(c, &s)) {
+        const ascc_measure_motion_sums m = cell_motion(&s);
+        good = cell_nothing_escapes(c, &s) && cell_nothing_clumps(c, &s);
+        if (good && m.kinetic > start - m.potential + 0.05 * start)
+            good = cell_fail(c, "energy %+.0f %% of the potential",
+                             100.0 * (m.kinetic + m.potential - start) / start);
+    }
+    cell_close(c, &s);
+    world_free(&w);
+}
+
+static void dam_break(cell *c)
+{
+    break_dam(c, dam(SPACING));
+}
+
+static void short_step(cell *c)
+{
+    world w = dam(SPACING);
+    w.scene.time_step *= 0.5;
+    break_dam(c, w);
+}
+
+static void long_step(cell *c)
+{
+    world w = dam(SPACING);
+    w.scene.time_step *= 2.0;
+    break_dam(c, w);
+}
+
+static void fine(cell *c)
+{
+    break_dam(c, dam(0.5 * SPACING));
+}
+
+static void coarse(cell *c)
+{
+    break_dam(c, dam(2.0 * SPACING));
+}
+
+/* ---- At rest --------------------------------------------------------------------------------- */
+
+static void still_column(cell *c)
+{
+    world w = column();
+    simulation s;
+    bool good = cell_open(c, &w, &s);
+    double kinetic = 0.0; /* greatest in the last tenth */
+    double middle = NAN;  /* height half way */
+    while (good && cell_step(c, &s)) {
+        good = cell_nothing_escapes(c, &s) && cell_slower_than(c, &s, FALL);
+        if (s.frame == c->frames / 2)
+            middle = cell_motion(&s).center[1];
+        if (s.frame > c->frames - c->frames / 10)
+            kinetic = fmax(kinetic, cell_motion(&s).kinetic);
+    }
+    if (good && cell_complete(c, &s)) {
+        const ascc_measure_motion_sums m = cell_motion(&s);
+        const double change = m.center[1] / middle - 1.0;
+        if (fabs(change) > 0.01)
+            cell_fail(c, "height %+.1f %% in the second half", 100.0 * change);
+        else if (kinetic > 1e-4 * m.potential)
+            cell_fail(c, "kinetic / potential %.1e", kinetic / m.potential);
+    }
+    cell_close(c, &s);
+    world_free(&w);
+}
+
+/* ---- Without gravity ------------------------------------------------------------------------- */
+
+static double distance(const double a[3], const double b[3])
+{
+    return sqrt((a[0] - b[0]) * (a[0] - b[0]) + (a[1] - b[1]) * (a[1] - b[1]) +
+                (a[2] - b[2]) * (a[2] - b[2]));
+}
+
+static double farthest(const simulation *s, const double from[3])
+{
+    double most = 0.0;
+    for (size_t i = 0; i < s->world->scene.fluid_count; i++)
+        most = fmax(most, distance(s->position + 3 * i, from));
+    return most;
+}
+
+static void blob(cell *c)
+{
+    world w = world_empty(SPACING);
+    simulation s;
+    w.scene.gravity[1] = 0.0;
+    world_block(&w, (double[]){-4 * SPACING, -4 * SPACING, -4 * SPACING}, (int[]){8, 8, 8}, still);
+    bool good = cell_open(c, &w, &s);
+    const double reach = farthest(&s, still);
+    while (good && cell_step(c, &s)) {
+        const ascc_measure_motion_sums m = cell_motion(&s);
+        if (distance(m.center, still) > 1e-5 * SPACING)
+            good = cell_fail(c, "centre moved %.1e spacings", distance(m.center, still) / SPACING);
+        else if (farthest(&s, m.center) > reach + SPACING)
+            good = cell_fail(c, "spread by more than a spacing");
+    }
+    cell_close(c, &s);
+    world_free(&w);
+}
+
+static void rotating_drop(cell *c)
+{
+    const double omega = 2.0;
+    world w = world_empty(SPACING);
+    simulation s;
+    w.scene.gravity[1] = 0.0;
+    world_ball(&w, 4 * SPACING);
+    for (size_t i = 0; i < w.scene.fluid_count; i++) {
+        w.velocity[3 * i] = -omega * w.position[3 * i + 1];
+        w.velocity[3 * i + 1] = omega * w.position[3 * i];
+    }
+    bool good = cell_open(c, &w, &s);
+    const double start = cell_motion(&s).angular_about_center[2];
+    while (good && cell_step(c, &s)) {
+        const double change = cell_motion(&s).angular_about_center[2] / start - 1.0;
+        good = fabs(change) < 0.01 || cell_fail(c, "angular momentum %+.1f %%", 100.0 * change);
+    }
+    cell_close(c, &s);
+    world_free(&w);
+}
+
+/* ---- Turned and mirrored --------------------------------------------------------------------- */
+
+static void map_back(simulation *s, world_map *back)
+{
+    for (size_t i = 0; i < s->world->scene.fluid_count; i++) {
+        back(s->position + 3 * i);
+        back(s->velocity + 3 * i);
+    }
+}
+
+/* Fails where the second run, mapped back, is not like the first. */
+static void compare(cell *c, const simulation *s, const simulation *t)
+{
+    ascc_measure_set a = {.dimension = 3, .count = s->world->scene.fluid_count}, b = a;
+    double there = NAN, back = NAN;
+    a.position = s->position;
+    b.position = t->position;
+    (void)ascc_measure_chamfer(&a, &b, 1, &there, &back);
+    const double kinetic = cell_motion(t).kinetic / cell_motion(s).kinetic - 1.0;
+    if (!(fmax(there, back) < 0.25 * SPACING))
+        cell_fail(c, "Chamfer %.2g spacings", fmax(there, back) / SPACING);
+    else if (!(fabs(kinetic) < 0.1))
+        cell_fail(c, "kinetic energy %+.0f %%", 100.0 * kinetic);
+}
+
+static void mapped(cell *c, world_map *map, world_map *back)
+{
+    world w = dam(SPACING), other = world_copy(&w);
+    simulation s, t;
+    world_apply(&other, map);
+    bool good = cell_open(c, &w, &s);
+    good = cell_open(c, &other, &t) && good;
+    while (good && cell_step(c, &s) && cell_step(c, &t))
+        ;
+    if (good && s.frame > 0 && s.frame == t.frame && c->verdict != FAIL) {
+        map_back(&t, back);
+        compare(c, &s, &t);
+    }
+    cell_close(c, &s);
+    cell_close(c, &t);
+    world_free(&w);
+    world_free(&other);
+}
+
+static void sideways(cell *c)
+{
+    mapped(c, world_turn, world_turn_back);
+}
+
+static void reversed(cell *c)
+{
+    mapped(c, world_flip, world_flip);
+}
+
+/* ---- Same bits ------------------------------------------------------------------------------- */
+
+/* Row i of the first is row n - 1 - i of the second, or row i. */
+static bool same_bits(cell *c, const simulation *s, const simulation *t, bool reverse)
+{
+    const size_t n = s->world->scene.fluid_count;
+    for (size_t i = 0; i < n; i++) {
+        const size_t j = reverse ? n - 1 - i : i;
+        if (memcmp(s->position + 3 * i, t->position + 3 * j, 3 * sizeof(double)) != 0)
+            return cell_fail(c, "other bits, by %.1e spacings",
+                             distance(s->position + 3 * i, t->position + 3 * j) / SPACING);
+    }
+    return true;
+}
+
+static void bits(cell *c, world *w, world *other, bool reverse)
+{
+    simulation s, t;
+    bool good = cell_open(c, w, &s);
+    good = cell_open(c, other, &t) && good;
+    while (good && cell_step(c, &s) && cell_step(c, &t))
+        good = same_bits(c, &s, &t, reverse);
+    cell_close(c, &s);
+    cell_close(c, &t);
+    world_free(w);
+    world_free(other);
+}
+
+static void order(cell *c)
+{
+    world w = dam(SPACING), other = world_copy(&w);
+    const size_t n = w.scene.fluid_count;
+    for (size_t i = 0; i < n; i++)
+        memcpy(other.position + 3 * i, w.position + 3 * (n - 1 - i), 3 * sizeof(double));
+    bits(c, &w, &other, true);
+}
+
+static void far_particle(cell *c)
+{
+    world w = dam(SPACING), other = world_copy(&w);
+    world_add(&other, (double[]){500.0 * SPACING, 1.0, 0.0}, still);
+    bits(c, &w, &other, false);
+}
+
+/* ---- Violence -------------------------------------------------------------------------------- */
+
+static void jet(cell *c)
+{
+    const double half = 12.0 * SPACING;
+    world w = world_empty(SPACING);
+    simulation s;
+    w.scene.gravity[1] = 0.0;
+    world_sheet(&w, half);
+    /* 20 radii a step */
+    world_block(&w, (double[]){11 * SPACING, -2 * SPACING, -2 * SPACING}, (int[]){8, 4, 4},
+                (double[]){-10.0 * SPACING / w.scene.time_step, 0.0, 0.0});
+    bool good = cell_open(c, &w, &s);
+    while (good && cell_step(c, &s)) {
+        size_t through = 0;
+        for (const double *x = s.position; x < s.position + 3 * w.scene.fluid_count; x += 3)
+            through += x[0] < -0.5 * SPACING && fabs(x[1]) < half && fabs(x[2]) < half;
+        good = through == 0 || cell_fail(c, "%zu of %zu through", through, w.scene.fluid_count);
+    }
+    cell_close(c, &s);
+    world_free(&w);
+}
+
+static void emission(cell *c)
+{
+    world w = column();
+    simulation s;
+    /* the middle of the lattice's cells, where there is fluid */
+    world_block(&w, (double[]){2 * SPACING, 4 * SPACING, 2 * SPACING}, (int[]){2, 2, 2}, still);
+    bool good = cell_open(c, &w, &s);
+    while (good && cell_step(c, &s))
+        good = cell_nothing_escapes(c, &s) && cell_slower_than(c, &s, FALL);
+    cell_close(c, &s);
+    world_free(&w);
+}
+
+static void coincident(cell *c)
+{
+    world w = column();
+    simulation s;
+    memcpy(w.position, w.position + 3, 3 * sizeof(double));
+    bool good = cell_open(c, &w, &s);
+    while (good && cell_step(c, &s))
+        good = cell_nothing_escapes(c, &s) && cell_slower_than(c, &s, FALL);
+    cell_close(c, &s);
+    world_free(&w);
+}
+
+static void single(cell *c)
+{
+    world w = column();
+    simulation s;
+    w.scene.fluid_count = 0;
+    world_add(&w, (double[]){3 * SPACING, 12 * SPACING, 3 * SPACING}, still);
+    bool good = cell_open(c, &w, &s);
+    while (good && cell_step(c, &s))
+        good = cell_nothing_escapes(c, &s) && cell_slower_than(c, &s, FALL);
+    cell_close(c, &s);
+    world_free(&w);
+}
+
+/* ---- The table ------------------------------------------------------------------------------- */
+
+#define DAM                                                                                        \
+    "no escape; pairs below spacing / 5 at most 0.1 %; kinetic at most what was released + 5 % "   \
+    "of what there is"
+
+const stability_scene stability_scenes[] = {
+    {"dam break", DAM, 60, 3200, dam_break},
+    {"dt x 0.5", DAM, 40, 400, short_step},
+    {"dt x 2", DAM, 40, 400, long_step},
+    {"spacing x 0.5", DAM, 40, 400, fine},
+    {"spacing x 2", DAM, 40, 400, coarse},
+    {"still column",
+     "no escape; height of the centre changes by less than 1 % in the second half; kinetic / "
+     "potential below 1e-4 in the last tenth",
+     200, 10000, still_column},
+    {"zero gravity blob", "centre fixed to 1e-5 spacings, reach grows by less than a spacing", 60,
+     1000, blob},
+    {"rotating drop", "angular momentum within 1 %", 60, 500, rotating_drop},
+    {"sideways gravity",
+     "as the turned run: Chamfer below spacing / 4, kinetic energy within 10 % at the end", 20, 20,
+     sideways},
+    {"reversed gravity", "as the mirrored run: the same line", 20, 20, reversed},
+    {"particle order", "reversed order of particles: same bits", 10, 50, order},
+    {"far particle", "one particle 1,000 radii away: others' bits the same", 10, 50, far_particle},
+    {"jet at a sheet", "20 radii a step at one layer of wall points: nothing through", 10, 20, jet},
+    {"emission",
+     "8 particles where fluid is: no escape, nothing faster than a fall through the box", 20, 200,
+     emission},
+    {"coincident", "two particles in one place: the same line", 20, 200, coincident},
+    {"single particle", "one particle falls: the same line", 40, 200, single},
+    {NULL, NULL, 0, 0, NULL},
+};

@@ -1,0 +1,349 @@
+/* Every method in every scene where methods fail: a matrix of pass, or when and how it failed.
+ * SPDX-License-Identifier: MIT
+ *
+ *   stability [--quick] [--shared DIR] [--docs DIR] [--scenes 'A;B'] [--methods 'A;B'] [--frames N]
+ *             [--budget SECONDS] [--jobs N]
+ */
+#define _DEFAULT_SOURCE /* MAP_ANONYMOUS, getloadavg */
+#include <math.h>
+#include <stdatomic.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/mman.h>
+#include <sys/wait.h>
+#include <time.h>
+#include <unistd.h>
+
+#include "evaluate.h"
+#include "suite.h"
+
+/* Name, method; @ is the folder of shared data. */
+static const char *const methods[][2] = {
+    {"DMCF", "@/data/weights/dmcf-liquid3d.safetensors"},
+    {"CConv", "@/data/weights/cconv-liquid3d.safetensors"},
+    {"demo", "demo"},
+    {"SPH", "sph:cs=25"},
+    {"SPH, step x 8", "sph:cs=25,courant=4"},
+    {"PBF", "pbf:iterations=4,substeps=4"},
+    {"ballistic", "ballistic"},
+};
+
+enum { METHODS = sizeof methods / sizeof *methods, MOST_METHODS = 32, MOST_SCENES = 64 };
+
+typedef struct suite {
+    const char *shared, *docs, *only_scenes, *only_methods;
+    bool quick;
+    long frames;
+    double budget;
+    int jobs;
+    size_t scene_count, method_count;
+    const stability_scene *scene[MOST_SCENES];
+    const char *method[MOST_METHODS];
+    char words[MOST_METHODS][512];
+} suite;
+
+/* What the processes share. */
+typedef struct board {
+    atomic_size_t next;
+    cell cells[MOST_SCENES][MOST_METHODS];
+    double seconds[MOST_SCENES][MOST_METHODS];
+} board;
+
+/* ---- What to run ----------------------------------------------------------------------------- */
+
+static bool listed(const char *list, const char *name)
+{
+    const size_t length = strlen(name);
+    for (const char *at = list; at && *at; at += strcspn(at, ";"), at += *at == ';')
+        if (strcspn(at, ";") == length && memcmp(at, name, length) == 0)
+            return true;
+    return !list;
+}
+
+static void choose(suite *s)
+{
+    for (const stability_scene *scene = stability_scenes; scene->name; scene++)
+        if (s->scene_count < MOST_SCENES && listed(s->only_scenes, scene->name))
+            s->scene[s->scene_count++] = scene;
+    for (size_t m = 0; m < METHODS; m++) {
+        char *word = s->words[s->method_count];
+        if (!listed(s->only_methods, methods[m][0]))
+            continue;
+        if (methods[m][1][0] == '@')
+            snprintf(word, sizeof *s->words, "%s%s", s->shared, methods[m][1] + 1);
+        else
+            snprintf(word, sizeof *s->words, "%s", methods[m][1]);
+        if (methods[m][1][0] == '@' && access(word, R_OK) != 0) {
+            fprintf(stderr, "stability: %s: no %s, left out\n", methods[m][0], word);
+            continue;
+        }
+        s->method[s->method_count++] = methods[m][0];
+    }
+}
+
+/* ---- Running --------------------------------------------------------------------------------- */
+
+static void run_cell(const suite *s, board *b, size_t k)
+{
+    const size_t i = k / s->method_count, j = k % s->method_count;
+    const stability_scene *scene = s->scene[i];
+    cell *c = &b->cells[i][j];
+    *c = (cell){.frames = s->frames > 0 ? s->frames
+                          : s->quick    ? scene->quick
+                                        : scene->full,
+                .budget = s->budget,
+                .start = (double)clock() / CLOCKS_PER_SEC};
+    c->method = ascc_method_find(s->words[j], &c->settings);
+    scene->run(c);
+    b->seconds[i][j] = (double)clock() / CLOCKS_PER_SEC - c->start;
+}
+
+static void verdict_text(const cell *c, char *text, size_t capacity)
+{
+    if (c->verdict == FAIL)
+        snprintf(text, capacity, "frame %ld: %s", c->frame, c->text);
+    else if (c->verdict == CUT)
+        snprintf(text, capacity, "no failure in %ld of %ld", c->frame, c->frames);
+    else
+        snprintf(text, capacity, "pass (%ld)", c->frame);
+}
+
+static void work(const suite *s, board *b)
+{
+    const size_t count = s->scene_count * s->method_count;
+    for (size_t k; (k = atomic_fetch_add(&b->next, 1)) < count;) {
+        char text[256];
+        const size_t i = k / s->method_count, j = k % s->method_count;
+        run_cell(s, b, k);
+        verdict_text(&b->cells[i][j], text, sizeof text);
+        printf("%-18s %-14s %6.1f s  %s\n", s->scene[i]->name, s->method[j], b->seconds[i][j],
+               text);
+        fflush(stdout);
+    }
+}
+
+/* A method that crashes takes one process along; its cell says so. */
+static bool run_all(const suite *s, board *b)
+{
+    bool good = true;
+    for (size_t i = 0; i < s->scene_count; i++)
+        for (size_t j = 0; j < s->method_count; j++)
+            b->cells[i][j] = (cell){.verdict = FAIL, .text = "crashed, or was not run"};
+    fflush(stdout);
+    for (int k = 0; k < s->jobs; k++)
+        if (fork() == 0) {
+            work(s, b);
+            _exit(0);
+        }
+    for (int status; wait(&status) > 0;)
+        good = good && WIFEXITED(status);
+    return good;
+}
+
+/* ---- Documents ------------------------------------------------------------------------------- */
+
+static void cpu_name(char *name, size_t capacity)
+{
+    char line[256];
+    FILE *f = fopen("/proc/cpuinfo", "r");
+    snprintf(name, capacity, "an unknown CPU");
+    while (f && fgets(line, sizeof line, f))
+        if (strncmp(line, "model name", 10) == 0 && strchr(line, ':')) {
+            snprintf(name, capacity, "%.*s", (int)strcspn(strchr(line, ':') + 2, "\n"),
+                     strchr(line, ':') + 2);
+            break;
+        }
+    if (f)
+        fclose(f);
+}
+
+static void write_table(FILE *f, const suite *s, const board *b)
+{
+    char text[256];
+    fputs("| scene |", f);
+    for (size_t j = 0; j < s->method_count; j++)
+        fprintf(f, " %s |", s->method[j]);
+    fputs("\n|---|", f);
+    for (size_t j = 0; j < s->method_count; j++)
+        fputs("---|", f);
+    for (size_t i = 0; i < s->scene_count; i++) {
+        fprintf(f, "\n| %s |", s->scene[i]->name);
+        for (size_t j = 0; j < s->method_count; j++) {
+            verdict_text(&b->cells[i][j], text, sizeof text);
+            fprintf(f, b->cells[i][j].verdict == PASS ? " **%s** |" : " %s |", text);
+        }
+    }
+    fputc('\n', f);
+}
+
+static void write_markdown(FILE *f, const suite *s, const board *b)
+{
+    char cpu[128], date[32];
+    double load[3] = {NAN, NAN, NAN};
+    const time_t now = time(NULL);
+    (void)getloadavg(load, 3);
+    (void)strftime(date, sizeof date, "%Y-%m-%d", gmtime(&now));
+    cpu_name(cpu, sizeof cpu);
+    fprintf(f,
+            "<!-- matrix begins -->\n%s run of %s, %s, %d processes of one thread, load %.1f. A "
+            "cell was given %.0f s of CPU time.\n\n",
+            s->quick ? "The quick" : "The full", date, cpu, s->jobs, load[0], s->budget);
+    write_table(f, s, b);
+    fputs("\n| scene | passes when | frames, quick | full |\n|---|---|---|---|\n", f);
+    for (size_t i = 0; i < s->scene_count; i++)
+        fprintf(f, "| %s | %s | %ld | %ld |\n", s->scene[i]->name, s->scene[i]->line,
+                s->scene[i]->quick, s->scene[i]->full);
+    fputs("\n| method | is |\n|---|---|\n", f);
+    for (size_t j = 0; j < s->method_count; j++) {
+        const char *slash = strrchr(s->words[j], '/');
+        fprintf(f, "| %s | `%s` |\n", s->method[j], slash ? slash + 1 : s->words[j]);
+    }
+    fputs("<!-- matrix ends -->\n", f);
+}
+
+/* The text of an SVG element, without what XML minds. */
+static void svg_text(FILE *f, int x, int y, const char *style, const char *text, size_t most)
+{
+    fprintf(f, "<text x=\"%d\" y=\"%d\" %s>", x, y, style);
+    for (size_t k = 0; text[k] && k < most; k++)
+        if (text[k] == '<')
+            fputs("&lt;", f);
+        else if (text[k] == '&')
+            fputs("&amp;", f);
+        else
+            fputc(text[k], f);
+    fputs("</text>\n", f);
+}
+
+static void write_svg(FILE *f, const suite *s, const board *b)
+{
+    enum { WIDE = 190, HIGH = 38, LEFT = 140, TOP = 34 };
+    static const char *const colour[] = {"#b7e1b0", "#f4b6ae", "#f7e6a4"};
+    const int width = LEFT + WIDE * (int)s->method_count + 10,
+              height = TOP + HIGH * (int)s->scene_count + 34;
+    fprintf(f,
+            "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"%d\" height=\"%d\" "
+            "font-family=\"sans-serif\" font-size=\"11\">\n<rect width=\"%d\" height=\"%d\" "
+            "fill=\"white\"/>\n",
+            width, height, width, height);
+    for (size_t j = 0; j < s->method_count; j++)
+        svg_text(f, LEFT + WIDE * (int)j + WIDE / 2, 22,
+                 "text-anchor=\"middle\" font-weight=\"bold\" font-size=\"13\"", s->method[j], 40);
+    for (size_t i = 0; i < s->scene_count; i++) {
+        const int y = TOP + HIGH * (int)i;
+        svg_text(f, LEFT - 8, y + HIGH / 2 + 4, "text-anchor=\"end\" font-size=\"13\"",
+                 s->scene[i]->name, 40);
+        for (size_t j = 0; j < s->method_count; j++) {
+            const cell *c = &b->cells[i][j];
+            const int x = LEFT + WIDE * (int)j;
+            char first[64];
+            fprintf(f,
+                    "<rect x=\"%d\" y=\"%d\" width=\"%d\" height=\"%d\" rx=\"3\" fill=\"%s\"/>\n",
+                    x + 1, y + 1, WIDE - 2, HIGH - 2, colour[c->verdict]);
+            if (c->verdict == FAIL)
+                snprintf(first, sizeof first, "failed in frame %ld", c->frame);
+            else if (c->verdict == CUT)
+                snprintf(first, sizeof first, "out of time, no failure");
+            else
+                snprintf(first, sizeof first, "pass");
+            svg_text(f, x + 7, y + 16, c->verdict == PASS ? "font-weight=\"bold\"" : "", first, 40);
+            if (c->verdict == FAIL)
+                snprintf(first, sizeof first, "%.60s", c->text);
+            else
+                snprintf(first, sizeof first, "%ld of %ld frames", c->frame, c->frames);
+            svg_text(f, x + 7, y + 30, "fill=\"#444\"", first, 36);
+        }
+    }
+    svg_text(
+        f, LEFT, height - 12, "fill=\"#444\"",
+        "green: pass; red: failed; yellow: the time given ran out before all frames, without a "
+        "failure until then",
+        200);
+    fputs("</svg>\n", f);
+}
+
+/* Replaces what stands between the marks of docs/stability.md; the words around it stay. */
+static bool write_documents(const suite *s, const board *b)
+{
+    char path[600];
+    static char old[65536];
+    snprintf(path, sizeof path, "%s/stability.md", s->docs);
+    FILE *f = fopen(path, "r");
+    old[f ? fread(old, 1, sizeof old - 1, f) : 0] = 0;
+    if (f)
+        fclose(f);
+    char *begin = strstr(old, "<!-- matrix begins -->"),
+         *end = strstr(old, "<!-- matrix ends -->\n");
+    f = fopen(path, "w");
+    if (!f)
+        return false;
+    if (begin && end)
+        fwrite(old, 1, (size_t)(begin - old), f);
+    write_markdown(f, s, b);
+    if (begin && end)
+        fputs(end + strlen("<!-- matrix ends -->\n"), f);
+    bool good = fclose(f) == 0;
+    snprintf(path, sizeof path, "%s/figures/stability.svg", s->docs);
+    f = fopen(path, "w");
+    if (!f)
+        return false;
+    write_svg(f, s, b);
+    return fclose(f) == 0 && good;
+}
+
+/* ---- Arguments ------------------------------------------------------------------------------- */
+
+static bool read_option(suite *s, const char *name, const char *value)
+{
+    if (strcmp(name, "--shared") == 0)
+        s->shared = value;
+    else if (strcmp(name, "--docs") == 0)
+        s->docs = value;
+    else if (strcmp(name, "--scenes") == 0)
+        s->only_scenes = value;
+    else if (strcmp(name, "--methods") == 0)
+        s->only_methods = value;
+    else if (strcmp(name, "--frames") == 0)
+        return (s->frames = strtol(value, NULL, 10)) > 0;
+    else if (strcmp(name, "--budget") == 0)
+        return (s->budget = strtod(value, NULL)) > 0.0;
+    else if (strcmp(name, "--jobs") == 0)
+        return (s->jobs = (int)strtol(value, NULL, 10)) > 0;
+    else
+        return false;
+    return true;
+}
+
+int main(int argc, char **argv)
+{
+    static suite s = {.shared = "../shared"};
+    s.jobs = (int)sysconf(_SC_NPROCESSORS_ONLN);
+    for (int i = 1; i < argc; i++) {
+        if (strcmp(argv[i], "--quick") == 0) {
+            s.quick = true;
+            continue;
+        }
+        if (i + 1 == argc || !read_option(&s, argv[i], argv[i + 1])) {
+            fputs("usage: stability [--quick] [--shared DIR] [--docs DIR] [--scenes 'A;B']\n"
+                  "                 [--methods 'A;B'] [--frames N] [--budget SECONDS] [--jobs N]\n",
+                  stderr);
+            return 2;
+        }
+        i++;
+    }
+    if (!(s.budget > 0.0))
+        s.budget = s.quick ? 3.0 : 60.0;
+    choose(&s);
+    board *b = mmap(NULL, sizeof *b, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
+    if (b == MAP_FAILED || s.scene_count == 0 || s.method_count == 0) {
+        fputs("stability: nothing to run, or no memory\n", stderr);
+        return 1;
+    }
+    bool good = run_all(&s, b);
+    if (s.docs && !write_documents(&s, b)) {
+        fprintf(stderr, "stability: cannot write into %s\n", s.docs);
+        good = false;
+    }
+    return good ? 0 : 1;
+}

@@ -1,0 +1,48 @@
+#!/bin/sh
+# The stability suite on two scenes with two methods: what passes, what fails; prints TAP.
+# $1: a build folder. SPDX-License-Identifier: MIT
+cd "$(dirname "$0")/.." || exit 1
+stability=$(cd "${1:-build}" && pwd)/bench/stability || exit 1
+number=0
+failed=0
+folder=$(mktemp -d) || exit 1
+trap 'rm -rf "$folder"' EXIT
+cd "$folder" || exit 1
+mkdir -p docs/figures
+
+holds() {
+    name=$1
+    shift
+    number=$((number + 1))
+    if "$@" >/dev/null 2>&1; then
+        echo "ok $number - $name"
+    else
+        echo "not ok $number - $name"
+        sed 's/^/# /' out err
+        failed=1
+    fi
+}
+
+cat >docs/stability.md <<'END'
+before
+<!-- matrix begins -->
+old
+<!-- matrix ends -->
+after
+END
+"$stability" --quick --budget 60 --frames 8 --docs docs --methods 'SPH;ballistic' \
+    --scenes 'dam break;jet at a sheet' >out 2>err
+holds 'the suite runs' [ $? -eq 0 ]
+holds 'SPH holds a dam break for eight frames' grep -qE '^dam break +SPH .* pass \(8\)' out
+holds 'SPH holds a jet at one layer of wall' grep -qE '^jet at a sheet +SPH .* pass \(8\)' out
+holds 'free flight is seen to go through it' grep -qE '^jet at a sheet +ballistic .* through' out
+holds 'the matrix replaces the old one, and nothing else' sh -c '
+    [ "$(head -n 1 docs/stability.md)" = before ] && [ "$(tail -n 1 docs/stability.md)" = after ] &&
+        ! grep -q old docs/stability.md && grep -q "| dam break | \*\*pass (8)\*\* |" docs/stability.md'
+holds 'the picture is whole' sh -c 'tail -n 1 docs/figures/stability.svg | grep -qF "</svg>"'
+"$stability" --quick --budget 0.000001 --methods SPH --scenes 'still column' --jobs 1 >out 2>err
+holds 'a cell out of time does not pass' grep -q 'no failure in 0 of' out
+"$stability" --scenes nowhere >out 2>err
+holds 'a scene that is not there is an error' [ $? -eq 1 ]
+echo "1..$number"
+exit $failed
