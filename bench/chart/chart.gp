@@ -19,12 +19,12 @@ high(p) = p == 0 ? 1 : p == 1 ? 30 : 2
 # Columns of the CSV.
 cost = 6
 error(p) = p == 0 ? 9 : p == 1 ? 10 : 11
-front(p) = 15 + p
 title_of(p) = p == 0 ? "two frames: err\\_n2, m" : p == 1 ? "after 1 s: Chamfer distance, m" : \
     "after 1 s: mean density error"
 is(s, f) = (strcol(1) eq s && strcol(2) eq f)
 good(p, s, f) = is(s, f) ? column(error(p)) : NaN
-led(p, s) = (strcol(1) eq s && column(front(p)) == 1) ? column(error(p)) : NaN
+# The points of the front by cost, a method's name and its settings hold commas.
+led(p, s) = sprintf("< awk '{ split($0, q, \"\\\"\"); split(q[1], a, \",\"); split(q[5], b, \",\"); if (a[1] == \"%s\" && b[%d] == 1) print b[3] \",\" b[%d] }' %s | sort -t, -g", s, 12 + p, 6 + p, csv)
 floor_of(p, s) = system(sprintf("awk -F, '$1 == \"%s\" && $2 == \"floor\" { print $%d }' %s", s, error(p), csv))
 
 set multiplot layout 2,3 margins 0.06,0.985,0.085,0.90 spacing 0.055,0.13 \
@@ -41,7 +41,7 @@ do for [s in "test_000 dam_break"] {
         set yrange [low(p):high(p)]
         flat = floor_of(p, s) + 0.0
         plot flat with lines dt 3 lw 2 lc rgb "#888888" notitle, \
-            csv using cost:(led(p, s)) smooth unique with steps lw 6 lc rgb "#d8d8d8" notitle, \
+            led(p, s) using 1:2 with steps lw 6 lc rgb "#d8d8d8" notitle, \
             csv using cost:(good(p, s, "network")) with points pt 7 ps 1.3 lc rgb "#c0392b" title "networks", \
             csv using cost:(good(p, s, "SPH")) with points pt 5 ps 1.2 lc rgb "#2166ac" title "SPH: speed of sound c, m/s", \
             csv using cost:(good(p, s, "PBF")) with points pt 9 ps 1.4 lc rgb "#1b7837" title "PBF: substeps x iterations", \
