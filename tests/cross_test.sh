@@ -164,7 +164,7 @@ if [ "$(uname -m)" = x86_64 ]; then
         wide=$build/avx512-emulated
         flags="-O2 -std=c11 -ffp-contract=off -fno-math-errno -fno-trapping-math -Iinclude -c"
         # shellcheck disable=SC2086
-        gcc $flags -include tests/support/avx512_emulated.h -mavx2 -mfma -mpopcnt \
+        gcc $flags -include tests/support/avx512_emulated.h -mavx2 -mfma -mbmi2 -mpopcnt \
             lib/kernels/avx512.c -o "$wide.o" >"$wide.log" 2>&1 &&
             gcc $flags -DASCC_HAVE_AVX2 -DASCC_HAVE_AVX512 '-D__builtin_cpu_supports(x)=1' \
                 lib/kernels/select.c -o "$wide-select.o" >>"$wide.log" 2>&1 &&
