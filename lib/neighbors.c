@@ -341,7 +341,7 @@ static size_t cell_at(const ascc_grid *grid, size_t from, uint64_t key)
 ascc_status ascc_rows_open(ascc_rows *rows, const ascc_search_tools *tools, size_t expected)
 {
     const size_t count = rows->query->count;
-    rows->used = rows->capacity = 0;
+    rows->used = rows->capacity = rows->stored = 0;
     rows->longest = 0;
     rows->count = ascc_arena_take(tools->arena, count, sizeof *rows->count);
     rows->start = ascc_arena_take(tools->arena, count, sizeof *rows->start);
@@ -385,6 +385,7 @@ typedef struct rows_job {
     atomic_size_t used;
     atomic_uint crowded; /* 1 + a query row with too many neighbours */
     atomic_uint longest;
+    atomic_size_t stored;
 } rows_job;
 
 static void low_words(const ascc_points *points, size_t row, int32_t at[3])
@@ -505,19 +506,40 @@ static bool search_run(const rows_job *job, size_t begin, size_t end, const int3
     return true;
 }
 
-/* Puts a finished row at its place. */
-static void store_row(rows_job *job, size_t query, const uint32_t *found, size_t count)
+/* Neighbours a worker sets aside at once, so that threads seldom meet at the counter. */
+#define SET_ASIDE 2048
+
+/* What a worker has set aside and not used; its longest row, and all it stored. */
+typedef struct room {
+    size_t next, end;
+    size_t longest, stored;
+} room;
+
+/* Puts a finished row at its place, if there is one; else it is made again. */
+static void store_row(rows_job *job, room *r, size_t query, const uint32_t *found, size_t count)
 {
     ascc_rows *rows = job->rows;
-    const size_t start = atomic_fetch_add_explicit(&job->used, count, memory_order_relaxed);
-    if (start + count > rows->capacity)
-        return; /* made again when there is room */
-    memcpy(rows->neighbor + start, found, count * sizeof *found);
-    rows->start[query] = start;
+    if (count > r->end - r->next) {
+        const size_t wanted = ascc_max_size(count, SET_ASIDE);
+        r->next = atomic_fetch_add_explicit(&job->used, wanted, memory_order_relaxed);
+        r->end = r->next + wanted;
+    }
+    if (r->next + count > rows->capacity)
+        return;
+    memcpy(rows->neighbor + r->next, found, count * sizeof *found);
+    rows->start[query] = r->next;
     rows->count[query] = (uint32_t)count;
-    unsigned longest = atomic_load_explicit(&job->longest, memory_order_relaxed);
-    while (longest < count &&
-           !atomic_compare_exchange_weak_explicit(&job->longest, &longest, (unsigned)count,
+    r->next += count;
+    r->longest = ascc_max_size(r->longest, count);
+    r->stored += count;
+}
+
+static void tell(rows_job *job, const room *r)
+{
+    atomic_fetch_add_explicit(&job->stored, r->stored, memory_order_relaxed);
+    unsigned seen = atomic_load_explicit(&job->longest, memory_order_relaxed);
+    while (seen < r->longest &&
+           !atomic_compare_exchange_weak_explicit(&job->longest, &seen, (unsigned)r->longest,
                                                   memory_order_relaxed, memory_order_relaxed))
         ;
 }
@@ -562,6 +584,7 @@ static void make_rows(void *data, size_t begin, size_t end, int32_t slot)
     uint32_t *found = job->scratch + (size_t)slot * job->scratch_size;
     distance *heap = rows->limit ? job->heap + (size_t)slot * (size_t)rows->limit : NULL;
     run runs[9] = {0};
+    room set_aside = {0, 0, 0, 0};
     for (size_t c = begin; c < end; c++) {
         int n = 0;
         for (size_t s = grid->start[c]; s < grid->start[c + 1]; s++) {
@@ -581,9 +604,10 @@ static void make_rows(void *data, size_t begin, size_t end, int32_t slot)
                 }
             if (rows->limit)
                 count = keep_nearest(rows, at, (uint32_t)row, found, count, heap, &job->cut[row]);
-            store_row(job, row, found, count);
+            store_row(job, &set_aside, row, found, count);
         }
     }
+    tell(job, &set_aside);
 }
 
 /* One pass over all query cells; the rows that did not fit are left absent. */
@@ -591,7 +615,7 @@ static ascc_status rows_pass(rows_job *job)
 {
     const ascc_rows *rows = job->rows;
     atomic_store(&job->used, rows->used);
-    ascc_workers_run(job->tools->workers, rows->query_grid->cell_count, 32, make_rows, job);
+    ascc_workers_run(job->tools->workers, rows->query_grid->cell_count, 64, make_rows, job);
     const unsigned crowded = atomic_load(&job->crowded);
     if (crowded)
         return ascc_fail(job->tools->message, ASCC_ERROR_LIMIT,
@@ -657,6 +681,7 @@ ascc_status ascc_rows_make(ascc_rows *rows, const ascc_search_tools *tools, cons
         return status;
     rows->used = needed;
     rows->longest = (uint32_t)ascc_max_size(rows->longest, atomic_load(&job.longest));
+    rows->stored += atomic_load(&job.stored);
     if (mutual)
         ascc_workers_run(tools->workers, rows->query->count, 256, drop_one_sided, &job);
     return ASCC_OK;

@@ -103,7 +103,8 @@ typedef struct ascc_rows {
     uint32_t *count;       /* [query count]; ASCC_ROW_ABSENT = not made */
     size_t *start;         /* [query count] into neighbor */
     uint32_t *neighbor;    /* rows of the source set */
-    size_t capacity, used;
+    size_t capacity, used; /* entries there is room for, and set aside */
+    size_t stored;         /* entries that rows hold */
     uint32_t longest;
 } ascc_rows;
 

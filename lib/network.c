@@ -258,6 +258,7 @@ static void mark_neighbors(void *data, size_t begin, size_t end, int32_t slot)
     (void)slot;
     mark_job *job = data;
     const ascc_rows *rows = job->rows;
+    size_t marked = 0; /* told once at the end: threads share that counter */
     for (size_t i = begin; i < end; i++) {
         if (!job->active[i])
             continue;
@@ -268,9 +269,10 @@ static void mark_neighbors(void *data, size_t begin, size_t end, int32_t slot)
             uint8_t *flag = &job->source[neighbor[k]];
             if (!__atomic_load_n(flag, __ATOMIC_RELAXED) &&
                 !__atomic_exchange_n(flag, (uint8_t)1, __ATOMIC_RELAXED))
-                atomic_fetch_sub_explicit(&job->left, 1, memory_order_relaxed);
+                marked++;
         }
     }
+    atomic_fetch_sub_explicit(&job->left, marked, memory_order_relaxed);
 }
 
 /* Makes the rows of the active queries and marks what they read. */
@@ -353,7 +355,7 @@ ascc_status ascc_network_demand(ascc_network_run *run, ascc_network *network,
     for (int32_t k = 0; status == ASCC_OK && k < network->key_count; k++) {
         const ascc_rows *rows = &run->rows[k];
         network->key[k].expected = rows->used + rows->used / 8;
-        run->neighbor_count += rows->used;
+        run->neighbor_count += rows->stored;
         run->longest = rows->longest > run->longest ? rows->longest : run->longest;
     }
     return status;
