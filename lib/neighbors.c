@@ -524,12 +524,13 @@ static void store_row(rows_job *job, room *r, size_t query, const uint32_t *foun
         r->next = atomic_fetch_add_explicit(&job->used, wanted, memory_order_relaxed);
         r->end = r->next + wanted;
     }
-    if (r->next + count > rows->capacity)
+    const size_t start = r->next;
+    r->next += count; /* also where there is no room: what is set aside tells how much is needed */
+    if (start + count > rows->capacity)
         return;
-    memcpy(rows->neighbor + r->next, found, count * sizeof *found);
-    rows->start[query] = r->next;
+    memcpy(rows->neighbor + start, found, count * sizeof *found);
+    rows->start[query] = start;
     rows->count[query] = (uint32_t)count;
-    r->next += count;
     r->longest = ascc_max_size(r->longest, count);
     r->stored += count;
 }
