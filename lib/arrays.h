@@ -1,4 +1,5 @@
-/* Reading and writing the host's strided arrays. SPDX-License-Identifier: MIT */
+/* Numbers in the host's arrays: float or double, at any distance from each other.
+ * SPDX-License-Identifier: MIT */
 #ifndef ASCC_ARRAYS_H
 #define ASCC_ARRAYS_H
 
@@ -6,25 +7,14 @@
 
 #include "common.h"
 
-/* Where component c of row i lies, for an array whose strides may be 0 = packed. */
-static inline ptrdiff_t ascc_array_offset(ptrdiff_t stride, ptrdiff_t component_stride,
-                                          ascc_scalar scalar, size_t row, size_t c,
-                                          size_t components)
+static inline ptrdiff_t ascc_scalar_size(ascc_scalar scalar)
 {
-    const ptrdiff_t size =
-        scalar == ASCC_DOUBLE ? (ptrdiff_t)sizeof(double) : (ptrdiff_t)sizeof(float);
-    const ptrdiff_t across = component_stride ? component_stride : size;
-    const ptrdiff_t down = stride ? stride : size * (ptrdiff_t)components;
-    return (ptrdiff_t)row * down + (ptrdiff_t)c * across;
+    return scalar == ASCC_DOUBLE ? (ptrdiff_t)sizeof(double) : (ptrdiff_t)sizeof(float);
 }
 
-static inline double ascc_array_read(const ascc_const_array *array, size_t row, size_t c,
-                                     size_t components)
+static inline double ascc_scalar_read(const unsigned char *at, ascc_scalar scalar)
 {
-    const unsigned char *at = (const unsigned char *)array->data +
-                              ascc_array_offset(array->stride, array->component_stride,
-                                                array->scalar, row, c, components);
-    if (array->scalar == ASCC_DOUBLE) {
+    if (scalar == ASCC_DOUBLE) {
         double value;
         memcpy(&value, at, sizeof value);
         return value;
@@ -34,18 +24,26 @@ static inline double ascc_array_read(const ascc_const_array *array, size_t row, 
     return (double)value;
 }
 
-static inline void ascc_array_write(const ascc_array *array, size_t row, size_t c,
-                                    size_t components, double value)
+static inline void ascc_scalar_write(unsigned char *at, ascc_scalar scalar, double value)
 {
-    unsigned char *at =
-        (unsigned char *)array->data + ascc_array_offset(array->stride, array->component_stride,
-                                                         array->scalar, row, c, components);
-    if (array->scalar == ASCC_DOUBLE) {
+    if (scalar == ASCC_DOUBLE) {
         memcpy(at, &value, sizeof value);
         return;
     }
-    const float rounded = (float)value;
-    memcpy(at, &rounded, sizeof rounded);
+    const float narrow = (float)value;
+    memcpy(at, &narrow, sizeof narrow);
+}
+
+/* Component c of a row of an array whose strides may be 0 = packed. */
+static inline double ascc_array_read(const ascc_const_array *array, size_t row, size_t c,
+                                     size_t components)
+{
+    const ptrdiff_t size = ascc_scalar_size(array->scalar);
+    const ptrdiff_t across = array->component_stride ? array->component_stride : size;
+    const ptrdiff_t down = array->stride ? array->stride : size * (ptrdiff_t)components;
+    return ascc_scalar_read((const unsigned char *)array->data + (ptrdiff_t)row * down +
+                                (ptrdiff_t)c * across,
+                            array->scalar);
 }
 
 #endif

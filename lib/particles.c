@@ -12,6 +12,8 @@
  */
 #include "particles.h"
 
+#include "arrays.h"
+
 #include <float.h>
 #include <math.h>
 #include <stdio.h>
@@ -80,24 +82,12 @@ static double read_number(const source *from, size_t row, int32_t component)
 {
     const unsigned char *const at =
         from->data + (ptrdiff_t)row * from->row + component * from->component;
-    if (from->wide) {
-        double value;
-        memcpy(&value, at, sizeof value);
-        return value;
-    }
-    float value;
-    memcpy(&value, at, sizeof value);
-    return (double)value;
+    return ascc_scalar_read(at, from->wide ? ASCC_DOUBLE : ASCC_FLOAT);
 }
 
 static source repeated(const char *name, const double *value)
 {
     return (source){name, (const unsigned char *)value, 0, 0, true};
-}
-
-static ptrdiff_t scalar_size(ascc_scalar scalar)
-{
-    return scalar == ASCC_DOUBLE ? (ptrdiff_t)sizeof(double) : (ptrdiff_t)sizeof(float);
 }
 
 static bool is_scalar(ascc_scalar scalar)
@@ -120,7 +110,7 @@ static ascc_status open_source(ascc_particles *particles, const char *name,
         return ascc_particles_fail(particles, ASCC_ERROR_ARGUMENT,
                                    "%s: scalar %d, reserved %ld: not an array known here", name,
                                    (int)array->scalar, (long)array->reserved);
-    const ptrdiff_t size = scalar_size(array->scalar);
+    const ptrdiff_t size = ascc_scalar_size(array->scalar);
     from->data = array->data;
     from->component = array->component_stride != 0 ? array->component_stride : size;
     from->row = array->stride != 0 ? array->stride : components * size;
@@ -935,16 +925,6 @@ static double field_value(const ascc_particles *particles, ascc_kind kind, ascc_
     return particles->mass[row];
 }
 
-static void write_number(unsigned char *into, ascc_scalar scalar, double value)
-{
-    if (scalar == ASCC_DOUBLE) {
-        memcpy(into, &value, sizeof value);
-    } else {
-        const float narrow = (float)value;
-        memcpy(into, &narrow, sizeof narrow);
-    }
-}
-
 ascc_status ascc_particles_get(const ascc_particles *particles, ascc_kind kind, ascc_field field,
                                size_t first, size_t count, const ascc_array *values)
 {
@@ -959,14 +939,14 @@ ascc_status ascc_particles_get(const ascc_particles *particles, ascc_kind kind, 
                                    "values: NULL, or not an array known here");
 
     const int32_t components = field == ASCC_MASS ? 1 : particles->dimension;
-    const ptrdiff_t size = scalar_size(values->scalar);
+    const ptrdiff_t size = ascc_scalar_size(values->scalar);
     const ptrdiff_t step = values->component_stride != 0 ? values->component_stride : size;
     const ptrdiff_t stride = values->stride != 0 ? values->stride : components * size;
     unsigned char *const data = values->data;
     for (size_t row = 0; row < count; row++)
         for (int32_t c = 0; c < components; c++)
-            write_number(data + (ptrdiff_t)row * stride + c * step, values->scalar,
-                         field_value(particles, kind, field, first + row, c));
+            ascc_scalar_write(data + (ptrdiff_t)row * stride + c * step, values->scalar,
+                              field_value(particles, kind, field, first + row, c));
     return ASCC_OK;
 }
 
