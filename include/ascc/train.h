@@ -1,0 +1,138 @@
+/*
+ * libascc-train: trains networks for libascc over rollouts, with the run-time's own forward pass.
+ * SPDX-License-Identifier: MIT
+ *
+ * A program makes a trainer from a model file in memory (initial weights and all), adds sequences, and
+ * iterates: each iteration draws `batch` stretches of the sequences, rolls the present network out over
+ * each, and moves the weights once. `ascc train` is such a program.
+ *
+ * libascc-train brings its own copy of the run-time: it shares no handle with libascc, only bytes of
+ * model files. What ascc.h says of structs, destroy, units and printing holds here, too.
+ */
+#ifndef ASCC_TRAIN_H
+#define ASCC_TRAIN_H
+
+#include "ascc.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+typedef struct ascc_trainer ascc_trainer;
+
+/** A sequence to learn from, in metres. Copied by ascc_trainer_add_sequence. */
+typedef struct ascc_training_sequence {
+    size_t size;      /* sizeof(ascc_training_sequence) */
+    const char *name; /* for messages */
+    size_t frame_count, fluid_count, boundary_count;
+    const float *position;          /* [frame][fluid][dimension] */
+    const float *boundary_position; /* [boundary][dimension] */
+    const float *boundary_normal;   /* [boundary][dimension], unit, into the fluid */
+    double time_step;               /* s between frames: the model's, within 1e-4 of it */
+    double gravity[3];              /* m/s^2 */
+    double share;                   /* how often it is drawn, relative to the others; 0 = 1 */
+} ascc_training_sequence;
+
+/** A stretch of the schedule: until iteration `end`. */
+typedef struct ascc_training_stage {
+    uint64_t end;           /* iterations done when it is over, from the very start */
+    int32_t horizon;        /* T: steps of a rollout that the loss is taken over */
+    int32_t presteps;       /* W: steps before them without gradient; each rollout draws 0 to W */
+    double learning_rate;   /* at its beginning */
+    double learning_rate_end; /* at its end, on a geometric path; 0 = as at its beginning */
+} ascc_training_stage;
+
+/** Options of ascc_trainer_create. Zero means the default that is stated. */
+typedef struct ascc_trainer_options {
+    size_t size;                      /* sizeof(ascc_trainer_options) */
+    uint64_t seed;                    /* same seed and options, same weights to the bit */
+    int32_t thread_count;             /* rollouts computed at once; no influence on results; 0 = 1 */
+    int32_t batch;                    /* rollouts an iteration; 0 = 8 */
+    const ascc_training_stage *stage; /* at least one, `end` ascending */
+    int32_t stage_count;
+    int32_t position_gradients; /* 1: also through the places of particles; 0: as constants */
+    double beta1, beta2, epsilon; /* Adam: 0.9, 0.999, 1e-8 */
+    double clip;                /* largest norm of a gradient; 0 = 1 */
+    double average;             /* each iteration's share that the averaged weights keep, such as 0.999;
+                                   0 = not averaged */
+    double jitter;              /* noise on first positions and velocities, particle spacings (a step) */
+    int32_t rotate;             /* 1: turn rollouts about gravity (without gravity: about any axis) */
+    int32_t mirror;             /* 1: mirror every second rollout in a plane along gravity */
+    double neighbor_weight;     /* of exp(-w c / c_avg) in Eq. 3; 0 = 1; negative = all particles alike */
+    double density_weight;      /* of the penalty on compression, see docs/training.md; 0 = none */
+    double wall_weight;         /* of the penalty on particles in walls; 0 = none */
+    size_t memory_limit;        /* bytes of kept steps in all rollouts at once; what does not fit is
+                                   computed a second time; 0 = 4 GiB */
+    char *message;              /* where creation says what is wrong; may be NULL */
+    size_t message_size;
+} ascc_trainer_options;
+
+/** What an iteration did. */
+typedef struct ascc_training_report {
+    size_t size;         /* sizeof(ascc_training_report) */
+    uint64_t iteration;  /* done in all */
+    double loss;         /* mean of Eq. 3 over steps and rollouts, particle spacings */
+    double gradient_norm; /* before clipping */
+    double learning_rate;
+    int32_t horizon, presteps;
+    int32_t ended_early;  /* rollouts whose steps without gradient blew up and were cut */
+    int32_t skipped;      /* rollouts left out: their steps could not be computed */
+    double seconds;       /* wall clock */
+    double steps;         /* computed forwards */
+} ascc_training_report;
+
+/**
+ * Makes a trainer for a model file in memory (all tensors F32), which is copied.
+ * threads: one trainer is used by one thread at a time. errors: ARGUMENT, MEMORY, FORMAT.
+ */
+ASCC_API ascc_status ascc_trainer_create(const ascc_trainer_options *options, const void *model,
+                                         size_t model_size, ascc_trainer **trainer);
+ASCC_API void ascc_trainer_destroy(ascc_trainer **trainer);
+
+/** Adds a sequence to learn from. errors: ARGUMENT, MEMORY, MISMATCH, NOT_FINITE (names the frame). */
+ASCC_API ascc_status ascc_trainer_add_sequence(ascc_trainer *trainer,
+                                               const ascc_training_sequence *sequence);
+
+/**
+ * One iteration: `batch` rollouts, their mean gradient, one step of Adam.
+ * errors: ARGUMENT (no sequence long enough), MEMORY, NOT_FINITE (a loss or gradient that is not finite:
+ * weights and optimiser stay as they were; the message names sequence and frame).
+ */
+ASCC_API ascc_status ascc_trainer_iterate(ascc_trainer *trainer, ascc_training_report *report);
+
+/**
+ * Loss and gradient of one rollout, not augmented: `presteps` steps without gradient from `frame` >= 1,
+ * then `horizon` with. gradient: [ascc_trainer_parameter_count] or NULL (then it is not computed).
+ */
+ASCC_API ascc_status ascc_trainer_gradient(ascc_trainer *trainer, size_t sequence, size_t frame,
+                                           int32_t presteps, int32_t horizon, double *loss,
+                                           float *gradient);
+
+/** Numbers that are trained: the tensors of the file, in its order of names. */
+ASCC_API size_t ascc_trainer_parameter_count(const ascc_trainer *trainer);
+ASCC_API ascc_status ascc_trainer_get_parameters(const ascc_trainer *trainer, float *values);
+ASCC_API ascc_status ascc_trainer_set_parameters(ascc_trainer *trainer, const float *values);
+
+/** The model file with the present weights, or (averaged != 0) the averaged ones; valid until the next
+ * call that changes the trainer. NULL without memory. */
+ASCC_API const void *ascc_trainer_model(ascc_trainer *trainer, int32_t averaged, size_t *size);
+
+/** Iterations done. */
+ASCC_API uint64_t ascc_trainer_iteration(const ascc_trainer *trainer);
+
+/**
+ * Everything that the next iterations depend on besides options and sequences: weights, their average,
+ * Adam's moments, the iteration. Going on from a saved state gives the bits of never having stopped.
+ * save writes beside the path, syncs and renames: a file that is there is complete, whatever happens.
+ * errors: FILE (nothing is lost of a file that was there), FORMAT, MISMATCH (of another network), MEMORY.
+ */
+ASCC_API ascc_status ascc_trainer_save(const ascc_trainer *trainer, const char *path);
+ASCC_API ascc_status ascc_trainer_load(ascc_trainer *trainer, const char *path);
+
+/** One line about the last call that failed. */
+ASCC_API const char *ascc_trainer_message(const ascc_trainer *trainer);
+
+#ifdef __cplusplus
+}
+#endif
+#endif
