@@ -6,6 +6,8 @@
 
 #define BATCH 64
 #define SMALLEST_CHUNK 256
+/* Where a wall's sum of impulses is called full: one more pair cannot overflow it. */
+#define ASCC_WALL_LIMIT ((int64_t)1 << 62)
 /* Rounds |x| < 2^51 to the nearest integer, ties to even, in any build. */
 #define ROUND_MAGIC 6755399441055744.0
 
@@ -17,7 +19,10 @@ typedef struct pair_job {
     const double *mass;   /* [set rows] 0 for walls */
     bool uniform;         /* all fluid particles have one mass */
     int64_t *sum;         /* [set rows][dimension] */
-    float *share;         /* [set rows][8]: what each row gives each bump of a basis, else NULL */
+    /* What each row gives each bump of a part of a basis, [set rows][8], else NULL */
+    float *share[ASCC_PARTS];
+    const double *place; /* [set rows][3] positions that directions come from, else NULL */
+    int64_t *wall;       /* [boundary rows of the host][dimension] */
     size_t chunk, phase;
     atomic_uint_least64_t pairs;
     atomic_size_t reach;           /* rows that neighbours are apart at most */
@@ -32,6 +37,7 @@ typedef struct batch {
     float geometry[ASCC_GEOMETRY_ARRAYS * BATCH];
     float term[BATCH][4];  /* of a grid: a vector for each pair */
     float strength[BATCH]; /* of a basis: along the line from the row to the neighbour */
+    float damping[BATCH];
 } batch;
 
 /* Mass that turns a velocity correction into an impulse: the particles' own if they agree, else twice
@@ -55,17 +61,20 @@ static void note_bad_row(pair_job *job, size_t row)
         ;
 }
 
-/* Displacements from row i to the batch's neighbours in units, and their squares. */
+/* Displacements from row i to the batch's neighbours in units (or in the host's, at their places before
+ * the step), and their squares. */
 static void displacements(const pair_job *job, size_t i, const batch *b, double d[3][BATCH],
                           double square[BATCH])
 {
     for (size_t k = 0; k < b->count; k++)
         square[k] = 0.0;
-    for (int c = 0; c < 3; c++) {
+    for (size_t c = 0; c < 3; c++) {
         const int32_t *source = job->rows->source->low[c];
         const uint32_t here = (uint32_t)job->rows->query->low[c][i];
         for (size_t k = 0; k < b->count; k++) {
-            d[c][k] = (double)(int32_t)((uint32_t)source[b->neighbor[k]] - here);
+            const size_t j = b->neighbor[k];
+            d[c][k] = job->place ? job->place[j * 3 + c] - job->place[i * 3 + c]
+                                 : (double)(int32_t)((uint32_t)source[j] - here);
             square[k] += d[c][k] * d[c][k];
         }
     }
@@ -84,19 +93,46 @@ static void make_central(const pair_job *job, size_t i, const batch *b, double t
     }
 }
 
+/* The velocities' features of the fluid, [row][inputs]. */
+static const float *motion_of(const ascc_network_run *run, size_t row)
+{
+    const ascc_plan *plan = run->network->plan;
+    return run->value[0].raw + row * ascc_padded(plan->fluid_channels) + ascc_plan_motion(plan, 0);
+}
+
+/* Strengths along the lines d, of these squares, become vectors, damping included. Particles at one
+ * place have no line. `other` gives a neighbour's motion, NULL that of walls. */
+static void point_strengths(const pair_job *job, size_t i, const batch *b, bool damped, bool fluid,
+                            const double square[BATCH], double t[3][BATCH])
+{
+    const int32_t d = job->run->network->plan->dimension;
+    const double factor = job->scale->factor[0];
+    const float *own = damped ? motion_of(job->run, i) : NULL;
+    for (size_t k = 0; k < b->count; k++) {
+        const double length = sqrt(square[k]), inverse = length > 0.0 ? 1.0 / length : 0.0;
+        double strength = (double)b->strength[k];
+        if (damped) {
+            const float *other = fluid ? motion_of(job->run, b->neighbor[k]) : NULL;
+            double approach = 0.0;
+            for (int32_t c = 0; c < d; c++)
+                approach += ((double)own[c] - (other ? (double)other[c] : 0.0)) * t[c][k];
+            strength -= (double)b->damping[k] * (approach * inverse);
+        }
+        const double share = strength * factor * inverse;
+        for (int c = 0; c < 3; c++)
+            t[c][k] *= share;
+    }
+}
+
 /* Impulses on row i from the neighbours of the batch in quanta, before rounding. */
 static void impulses_of(const pair_job *job, size_t i, const batch *b, double t[3][BATCH])
 {
     const ascc_plan *plan = job->run->network->plan;
     const double *factor = job->scale->factor;
-    if (job->share) {
+    if (job->share[0]) {
         double square[BATCH];
         displacements(job, i, b, t, square);
-        for (size_t k = 0; k < b->count; k++) {
-            const double share = (double)b->strength[k] * factor[0] / sqrt(square[k]);
-            for (int c = 0; c < 3; c++)
-                t[c][k] *= share;
-        }
+        point_strengths(job, i, b, job->share[ASCC_PART_DAMPING] != NULL, true, square, t);
     } else {
         for (int c = 0; c < 3; c++)
             for (size_t k = 0; k < b->count; k++)
@@ -149,11 +185,12 @@ static void evaluate_kernel(const pair_job *job, size_t i, batch *b)
     const float *value = output_values(run);
     const ascc_geometry g =
         ascc_network_geometry(run, job->rows, filter, i, b->neighbor, b->count, b->geometry, BATCH);
-    if (job->share)
-        kernels->pair_strengths(g.pairs.distance, b->neighbor, b->count,
-                                job->share + i * ASCC_MAX_BUMPS, job->share, (size_t)filter->bumps,
-                                b->strength);
-    else
+    for (int part = 0; part <= ASCC_PART_DAMPING; part++)
+        if (job->share[part])
+            kernels->pair_strengths(g.pairs.distance, b->neighbor, b->count,
+                                    job->share[part] + i * ASCC_MAX_BUMPS, job->share[part],
+                                    (size_t)filter->bumps, part ? b->damping : b->strength);
+    if (!job->share[0])
         kernels->pair_terms(&g.pairs, g.window, b->neighbor, b->count, value + i * a, value, a,
                             filter->cells, run->network->term_weight[plan->term_count], d,
                             b->term[0]);
@@ -192,7 +229,7 @@ static void evaluate_row(pair_job *job, size_t i, batch *b)
         const uint32_t j = rows->neighbor[k];
         if (j <= i && job->fluid[j])
             continue; /* that pair belongs to row j */
-        if (rows->source->low[0][j] == rows->query->low[0][i] &&
+        if (!job->place && rows->source->low[0][j] == rows->query->low[0][i] &&
             rows->source->low[1][j] == rows->query->low[1][i] &&
             rows->source->low[2][j] == rows->query->low[2][i])
             continue; /* coincident: no direction, no impulse */
@@ -230,16 +267,97 @@ static void compute_shares(void *data, size_t begin, size_t end, int32_t slot)
     const size_t a = ascc_padded(plan->output.inputs);
     const uint8_t *active = run->value[plan->output.source].active;
     const float *value = output_values(run);
-    memset(job->share + begin * ASCC_MAX_BUMPS, 0,
-           (end - begin) * ASCC_MAX_BUMPS * sizeof *job->share);
     for (size_t i = begin, stop; i < end; i = stop) {
         for (stop = i + 1; stop < end && active[i] && active[stop];)
             stop++;
-        if (active[i])
-            run->tools->kernels->multiply(
-                value + i * a, a, stop - i, a, run->network->term_weight[plan->term_count],
-                ASCC_MAX_BUMPS, job->share + i * ASCC_MAX_BUMPS, ASCC_MAX_BUMPS);
+        for (int part = 0; part < ASCC_PARTS; part++) {
+            float *share = job->share[part] ? job->share[part] + i * ASCC_MAX_BUMPS : NULL;
+            if (share)
+                memset(share, 0, (stop - i) * ASCC_MAX_BUMPS * sizeof *share);
+            if (share && active[i])
+                run->tools->kernels->multiply(value + i * a, a, stop - i, a,
+                                              run->network->part_weight[part], ASCC_MAX_BUMPS,
+                                              share, ASCC_MAX_BUMPS);
+        }
     }
+}
+
+/* ---- Walls: pairs of a fluid particle and a wall ---- */
+
+/* Adds to a wall that several threads may push at once: integers, so their order does not matter.
+ * False when the sum comes near what can be held. */
+static bool push_wall(int64_t *sum, int64_t impulse)
+{
+    const int64_t before = __atomic_fetch_add(sum, impulse, __ATOMIC_RELAXED);
+    return before < ASCC_WALL_LIMIT && before > -ASCC_WALL_LIMIT;
+}
+
+/* From row i to host's boundary rows wall[]. */
+static void flush_walls(pair_job *job, size_t i, const size_t *wall, batch *b)
+{
+    static const float nothing[ASCC_MAX_BUMPS];
+    static const uint32_t nobody[BATCH];
+    const ascc_network_run *run = job->run;
+    const ascc_plan *plan = run->network->plan;
+    const size_t d = (size_t)plan->dimension;
+    double t[3][BATCH] = {{0.0}}, square[BATCH];
+    int64_t quanta[BATCH];
+    const ascc_geometry g = ascc_network_geometry(run, job->rows, &plan->output.walls.filter, i,
+                                                  b->neighbor, b->count, b->geometry, BATCH);
+    for (int part = ASCC_PART_WALL; part <= ASCC_PART_WALL_DAMPING; part++)
+        if (job->share[part])
+            run->tools->kernels->pair_strengths(
+                g.pairs.distance, nobody, b->count, job->share[part] + i * ASCC_MAX_BUMPS, nothing,
+                (size_t)plan->output.walls.filter.bumps,
+                part == ASCC_PART_WALL ? b->strength : b->damping);
+    for (size_t k = 0; k < b->count; k++) {
+        square[k] = 0.0;
+        for (size_t c = 0; c < d; c++) {
+            const size_t j = b->neighbor[k];
+            t[c][k] = job->place
+                          ? job->scale->wall_position[wall[k] * d + c] - job->place[i * 3 + c]
+                          : (double)(int32_t)((uint32_t)job->rows->source->low[c][j] -
+                                              (uint32_t)job->rows->query->low[c][i]);
+            square[k] += t[c][k] * t[c][k];
+        }
+    }
+    point_strengths(job, i, b, job->share[ASCC_PART_WALL_DAMPING] != NULL, false, square, t);
+    bool good = true;
+    for (size_t c = 0; c < d; c++) {
+        for (size_t k = 0; k < b->count; k++)
+            t[c][k] *= job->mass[i];
+        good &= round_all(t[c], b->count, quanta);
+        for (size_t k = 0; k < b->count && good; k++)
+            good = add_impulse(&job->sum[i * d + c], quanta[k]) &&
+                   push_wall(&job->wall[wall[k] * d + c], -quanta[k]);
+    }
+    if (!good)
+        note_bad_row(job, i);
+    b->pairs += b->count;
+    b->count = 0;
+}
+
+static void evaluate_walls(void *data, size_t begin, size_t end, int32_t slot)
+{
+    (void)slot;
+    pair_job *job = data;
+    const ascc_rows *rows = job->rows;
+    const ascc_hierarchy *h = job->run->hierarchy;
+    size_t wall[BATCH];
+    batch b;
+    b.count = b.pairs = 0;
+    for (size_t i = begin; i < end; i++) {
+        const uint32_t *neighbor = rows->neighbor + rows->start[i];
+        for (size_t k = 0; k < rows->count[i]; k++) {
+            wall[b.count] = h->origin[h->whole[ASCC_SET_BOUNDARY][neighbor[k]]] - h->fluid_count;
+            b.neighbor[b.count] = neighbor[k];
+            if (++b.count == BATCH)
+                flush_walls(job, i, wall, &b);
+        }
+        if (b.count)
+            flush_walls(job, i, wall, &b);
+    }
+    atomic_fetch_add_explicit(&job->pairs, b.pairs, memory_order_relaxed);
 }
 
 /* The farthest that two neighbours are apart in the order of rows. Where slots are rows, neighbours
@@ -294,17 +412,29 @@ static ascc_status take_job(pair_job *job, int32_t set, const ascc_impulse_scale
     uint8_t *fluid = ascc_arena_take(arena, count, 1);
     double *mass = ascc_arena_take(arena, count, sizeof *mass);
     job->sum = ascc_arena_take(arena, count, d * sizeof(int64_t));
-    const bool basis = job->run->network->plan->output.filter.bumps > 0;
-    if (basis)
-        job->share = ascc_arena_take(arena, count, ASCC_MAX_BUMPS * sizeof *job->share);
-    if (!fluid || !mass || !job->sum || (basis && !job->share))
+    const ascc_output *output = &job->run->network->plan->output;
+    bool taken = fluid && mass && job->sum;
+    for (int part = 0; part < ASCC_PARTS && output->filter.bumps; part++)
+        if (job->run->network->part_weight[part]) {
+            job->share[part] = ascc_arena_take(arena, count, ASCC_MAX_BUMPS * sizeof(float));
+            taken &= job->share[part] != NULL;
+        }
+    double *place = NULL;
+    if (output->current_direction) {
+        place = ascc_arena_take(arena, count, 3 * sizeof *place);
+        taken &= place != NULL;
+    }
+    if (!taken)
         return ascc_fail(job->run->tools->message, ASCC_ERROR_MEMORY, "no memory for the impulses");
     memset(job->sum, 0, count * d * sizeof(int64_t));
     for (size_t i = 0; i < count; i++) {
         const size_t row = host_row(h, set, i);
         fluid[i] = row < h->fluid_count;
         mass[i] = fluid[i] ? scale->mass[row] : 0.0;
+        for (size_t c = 0; place && c < 3; c++)
+            place[i * 3 + c] = c < d ? scale->position[row * d + c] : 0.0;
     }
+    job->place = place;
     job->fluid = fluid;
     job->mass = mass;
     job->uniform = true;
@@ -323,11 +453,12 @@ ascc_status ascc_antisymmetric_impulses(const ascc_network_run *run,
     const size_t count = h->set[set].count, d = (size_t)network->plan->dimension;
     pair_job job = {.run = run,
                     .rows = &run->rows[network->term_key[network->plan->term_count]],
-                    .scale = scale};
+                    .scale = scale,
+                    .wall = impulses->wall};
     const ascc_status status = take_job(&job, set, scale);
     if (status != ASCC_OK)
         return status;
-    if (job.share)
+    if (job.share[0])
         ascc_workers_run(run->tools->workers, count, 1024, compute_shares, &job);
     ascc_workers_run(run->tools->workers, count, 1024, measure_rows, &job);
     job.chunk = ascc_max_size(atomic_load(&job.reach), SMALLEST_CHUNK);
@@ -335,6 +466,10 @@ ascc_status ascc_antisymmetric_impulses(const ascc_network_run *run,
     for (job.phase = 0; job.phase < 3 && job.phase < chunks; job.phase++)
         ascc_workers_run(run->tools->workers, (chunks - job.phase + 2) / 3, 1, evaluate_chunks,
                          &job);
+    if (network->wall_key >= 0) {
+        job.rows = &run->rows[network->wall_key];
+        ascc_workers_run(run->tools->workers, count, 256, evaluate_walls, &job);
+    }
     const uint64_t bad = atomic_load(&job.bad_row);
     if (bad)
         return bad_value(run, output_values(run), ascc_padded(network->plan->output.inputs),

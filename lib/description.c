@@ -10,7 +10,7 @@
 static const char *const windows[] = {"none", "poly6", "peak"};
 static const char *const mappings[] = {"identity", "radial", "volume"};
 static const char *const evaluations[] = {"current", "advected", "advected_mean"};
-static const char *const features[] = {"one", "velocity", "normal"};
+static const char *const features[] = {"one", "velocity", "normal", "motion"};
 static const char *const samplings[] = {"voxel_centers", "voxel_corners", "farthest"};
 static const char *const anchors[] = {"world", "centroid"};
 static const char *const term_kinds[] = {"convolution", "dense", "identity", "transfer"};
@@ -183,6 +183,7 @@ static void read_term(ascc_plan_builder *builder, ascc_reader *reader, uint32_t 
         weight = ascc_reader_text(reader, object, "kernel");
         read_filter(reader, object, &term.filter, false);
         term.filter.skip_self = optional_flag(reader, object, "skip_self");
+        term.relative = optional_flag(reader, object, "relative");
     } else if (term.kind != ASCC_TERM_IDENTITY) {
         weight = ascc_reader_text(reader, object, "weight");
     }
@@ -251,10 +252,36 @@ static void read_scale(ascc_reader *reader, uint32_t object, int32_t dimension, 
         scale[i] = number;
 }
 
+static const char *optional_text(ascc_reader *reader, uint32_t object, const char *key)
+{
+    return ascc_reader_has(reader, object, key) ? ascc_reader_text(reader, object, key) : NULL;
+}
+
+/* What only an output with a basis has. */
+static void read_central(ascc_reader *reader, uint32_t object, ascc_output *output,
+                         ascc_output_names *names)
+{
+    static const char *const directions[] = {"current"};
+    if (ascc_reader_has(reader, object, "direction"))
+        output->current_direction =
+            1 + ascc_reader_choice(reader, object, "direction", directions, COUNT(directions));
+    names->damping = optional_text(reader, object, "damping");
+    if (!ascc_reader_has(reader, object, "walls"))
+        return;
+    const uint32_t walls = ascc_reader_object(reader, object, "walls");
+    ascc_reader_where(reader, "output 'walls'");
+    output->walls.present = 1;
+    names->wall_weight = ascc_reader_text(reader, walls, "kernel");
+    names->wall_damping = optional_text(reader, walls, "damping");
+    read_filter(reader, walls, &output->walls.filter, true);
+    ascc_reader_end(reader, walls);
+    ascc_reader_where(reader, "output");
+}
+
 static void read_output(ascc_plan_builder *builder, ascc_reader *reader)
 {
     ascc_output output = {.kind = ASCC_OUTPUT_PLAIN};
-    const char *weight = NULL;
+    ascc_output_names names = {NULL, NULL, NULL, NULL};
     int32_t storage = ASCC_FULL;
     ascc_reader_where(reader, "network");
     const uint32_t object = ascc_reader_object(reader, 0, "output");
@@ -267,8 +294,10 @@ static void read_output(ascc_plan_builder *builder, ascc_reader *reader)
     output.rectify = optional_flag(reader, object, "relu");
     read_scale(reader, object, builder->plan.dimension, output.scale);
     if (output.kind == ASCC_OUTPUT_ANTISYMMETRIC) {
-        weight = ascc_reader_text(reader, object, "kernel");
+        names.weight = ascc_reader_text(reader, object, "kernel");
         read_filter(reader, object, &output.filter, true);
+        if (output.filter.bumps)
+            read_central(reader, object, &output, &names);
     }
     if (output.kind == ASCC_OUTPUT_ANTISYMMETRIC && !output.filter.bumps) {
         output.radial =
@@ -278,7 +307,7 @@ static void read_output(ascc_plan_builder *builder, ascc_reader *reader)
     }
     ascc_reader_end(reader, object);
     if (reader->status == ASCC_OK)
-        reader->status = ascc_plan_set_output(builder, &output, weight, storage);
+        reader->status = ascc_plan_set_output(builder, &output, &names, storage);
 }
 
 ascc_status ascc_description_read(ascc_plan_builder *builder, const char *text)

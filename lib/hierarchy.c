@@ -20,6 +20,7 @@ void ascc_plan_radii(const ascc_plan *plan, double *smallest, double *largest)
         *smallest = radius < *smallest ? radius : *smallest;
         *largest = radius > *largest ? radius : *largest;
     }
+    *largest = fmax(*largest, plan->output.walls.filter.radius);
     if (*largest == 0.0) /* a network of dense layers: any scale will do */
         *smallest = *largest = plan->spacing > 0.0 ? plan->spacing : 1.0;
 }

@@ -248,7 +248,8 @@ ascc_status ascc_model_get_info(const ascc_model *model, ascc_model_info *info)
         .conserves_momentum = antisymmetric,
         /* Central impulses at x make no torque about x; at advected positions they do. */
         .conserves_angular_momentum =
-            antisymmetric && plan->output.radial && plan->advection == ASCC_ADVECT_NONE,
+            antisymmetric && plan->output.radial &&
+            (plan->advection == ASCC_ADVECT_NONE || plan->output.current_direction),
         .advected = plan->advection != ASCC_ADVECT_NONE,
         .neighbor_limit = ascc_plan_neighbor_limit(plan),
         .parameter_count = plan->parameter_count,

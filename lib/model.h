@@ -70,7 +70,7 @@ typedef struct ascc_term {
     const float
         *bias; /* [outputs] or NULL; added to every row the term reaches, also without neighbours */
     int32_t normalize; /* of a transfer: hats are divided by their sum */
-    int32_t reserved;
+    int32_t relative;  /* of a convolution of features: motion is taken relative to the query's own */
     double voxel;       /* of a transfer, m: hats are 0 this far away along any axis */
     ascc_filter filter; /* of a convolution or transfer */
 } ascc_term;
@@ -93,17 +93,26 @@ typedef enum ascc_output_kind {
     ASCC_OUTPUT_ANTISYMMETRIC, /* Eq. 2 on the source value */
 } ascc_output_kind;
 
+/* Pairs of a fluid particle and a wall, from the fluid particle's values alone. */
+typedef struct ascc_wall_output {
+    int32_t present, reserved;
+    ascc_filter filter;           /* a basis */
+    const float *weight, *damping; /* [bump][inputs]; damping or NULL */
+} ascc_wall_output;
+
 typedef struct ascc_output {
     ascc_output_kind kind;
     int32_t source;
     int32_t rectify;
     int32_t inputs;
     int32_t radial; /* pair terms projected on the line between the particles */
-    int32_t reserved;
+    int32_t current_direction; /* that line is taken before the step, whatever the network sees */
     ascc_filter filter;
     /* antisymmetric: the whole kernel [z][y][x][inputs][dimension]; with a basis [bump][inputs], whose
      * pair terms lie on the line between the particles by themselves */
     const float *weight;
+    const float *damping; /* [bump][inputs], none negative, times the pair's speed of approach; or NULL */
+    ascc_wall_output walls;
     double scale[3]; /* metres of position correction in one time step per unit of output */
 } ascc_output;
 
@@ -111,6 +120,7 @@ typedef enum ascc_feature {
     ASCC_FEATURE_ONE,
     ASCC_FEATURE_VELOCITY, /* fluid: after external forces, m/s; dimension channels */
     ASCC_FEATURE_NORMAL,   /* boundary; dimension channels */
+    ASCC_FEATURE_MOTION,   /* velocity in spacings a time step; walls 0; dimension channels */
 } ascc_feature;
 #define ASCC_MAX_FEATURES 8
 
@@ -154,6 +164,20 @@ typedef struct ascc_plan {
     ascc_output output;
     uint64_t parameter_count;
 } ascc_plan;
+
+/* First channel of the feature motion of value 0 (fluid) or 1 (boundary), -1 = none. */
+static inline int32_t ascc_plan_motion(const ascc_plan *plan, int32_t value)
+{
+    const int32_t *feature = value == 0 ? plan->fluid_features : plan->boundary_features;
+    const int32_t count = value == 0 ? plan->fluid_feature_count : plan->boundary_feature_count;
+    int32_t channel = 0;
+    for (int32_t i = 0; i < count; i++) {
+        if (feature[i] == ASCC_FEATURE_MOTION)
+            return channel;
+        channel += feature[i] == ASCC_FEATURE_ONE ? 1 : plan->dimension;
+    }
+    return -1;
+}
 
 struct ascc_model {
     uint32_t magic;

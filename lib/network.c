@@ -26,7 +26,7 @@ int32_t ascc_network_channels(const ascc_network *network, int32_t value)
                         : plan->layer[value - 2].channels;
 }
 
-static size_t cell_count(const ascc_filter *filter)
+size_t ascc_cell_count(const ascc_filter *filter)
 {
     return (size_t)filter->cells[0] * (size_t)filter->cells[1] * (size_t)filter->cells[2];
 }
@@ -73,14 +73,36 @@ static size_t arranged_size(const ascc_plan *plan, int32_t t)
     const ascc_output *output = &plan->output;
     if (t == plan->term_count)
         return output->kind != ASCC_OUTPUT_ANTISYMMETRIC ? 0
-               : output->filter.bumps ? ASCC_MAX_BUMPS * ascc_padded(output->inputs)
-                                      : cell_count(&output->filter) * (size_t)plan->dimension *
+               : output->filter.bumps ? ASCC_PARTS * ASCC_MAX_BUMPS * ascc_padded(output->inputs)
+                                      : ascc_cell_count(&output->filter) * (size_t)plan->dimension *
                                             ascc_padded(output->inputs);
     const ascc_term *term = &plan->term[t];
     if (term->kind == ASCC_TERM_IDENTITY)
         return 0;
-    const size_t cells = term->kind == ASCC_TERM_CONVOLUTION ? cell_count(&term->filter) : 1;
+    const size_t cells = term->kind == ASCC_TERM_CONVOLUTION ? ascc_cell_count(&term->filter) : 1;
     return cells * ascc_padded(term->inputs) * ascc_padded(term->outputs);
+}
+
+/* Weights of an output with a basis and their numbers of bumps, by part. */
+static const float *part_of(const ascc_output *output, int part, size_t *bumps)
+{
+    const float *const weights[ASCC_PARTS] = {output->weight, output->damping, output->walls.weight,
+                                              output->walls.damping};
+    *bumps = (size_t)(part < ASCC_PART_WALL ? output->filter.bumps : output->walls.filter.bumps);
+    return weights[part];
+}
+
+static void arrange_parts(const ascc_output *output, float *to)
+{
+    const size_t a = (size_t)output->inputs, size = ascc_padded(output->inputs) * ASCC_MAX_BUMPS;
+    memset(to, 0, ASCC_PARTS * size * sizeof *to);
+    for (int part = 0; part < ASCC_PARTS; part++, to += size) {
+        size_t bumps;
+        const float *from = part_of(output, part, &bumps);
+        for (size_t k = 0; from && k < bumps; k++)
+            for (size_t i = 0; i < a; i++)
+                to[i * ASCC_MAX_BUMPS + k] = from[k * a + i];
+    }
 }
 
 /* Fills up the channels of one term's weights with zeros; the output's are turned over as well. */
@@ -93,10 +115,7 @@ static void arrange(const ascc_plan *plan, int32_t t, float *to)
     const size_t b = (size_t)(last ? plan->dimension : term->outputs);
     const size_t a8 = ascc_padded((int32_t)a), b8 = last ? b : ascc_padded((int32_t)b);
     if (last && plan->output.filter.bumps) {
-        memset(to, 0, a8 * ASCC_MAX_BUMPS * sizeof *to);
-        for (size_t k = 0; k < (size_t)plan->output.filter.bumps; k++)
-            for (size_t i = 0; i < a; i++)
-                to[i * ASCC_MAX_BUMPS + k] = from[k * a + i];
+        arrange_parts(&plan->output, to);
         return;
     }
     const size_t cells = arranged_size(plan, t) / (a8 * b8);
@@ -107,14 +126,9 @@ static void arrange(const ascc_plan *plan, int32_t t, float *to)
                 to[last ? (c * b + o) * a8 + i : (c * a8 + i) * b8 + o] = from[(c * a + i) * b + o];
 }
 
-static bool arrange_all(ascc_network *network)
+void ascc_network_arrange(ascc_network *network)
 {
     const ascc_plan *plan = network->plan;
-    for (int32_t t = 0; t <= plan->term_count; t++)
-        network->weight_count += arranged_size(plan, t);
-    network->weights = ascc_allocate(network->allocator, network->weight_count, sizeof(float));
-    if (!network->weights)
-        return false;
     float *to = network->weights;
     for (int32_t t = 0; t <= plan->term_count; t++) {
         const size_t size = arranged_size(plan, t);
@@ -123,7 +137,22 @@ static bool arrange_all(ascc_network *network)
             arrange(plan, t, to);
         to += size;
     }
-    return true;
+    const float *part = network->term_weight[plan->term_count];
+    for (int p = 0; p < ASCC_PARTS && plan->output.filter.bumps; p++) {
+        size_t bumps;
+        network->part_weight[p] = part_of(&plan->output, p, &bumps) ? part : NULL;
+        part += ascc_padded(plan->output.inputs) * ASCC_MAX_BUMPS;
+    }
+}
+
+static bool arrange_all(ascc_network *network)
+{
+    for (int32_t t = 0; t <= network->plan->term_count; t++)
+        network->weight_count += arranged_size(network->plan, t);
+    network->weights = ascc_allocate(network->allocator, network->weight_count, sizeof(float));
+    if (network->weights)
+        ascc_network_arrange(network);
+    return network->weights != NULL;
 }
 
 ascc_status ascc_network_create(ascc_network *network, const ascc_allocator *allocator,
@@ -135,9 +164,10 @@ ascc_status ascc_network_create(ascc_network *network, const ascc_allocator *all
     network->value_count = plan->layer_count + 2;
     network->max_neighbors = max_neighbors;
     const size_t terms = (size_t)plan->term_count + 1;
+    network->wall_key = -1;
     const ascc_output *output = &plan->output;
     const bool antisymmetric = output->kind == ASCC_OUTPUT_ANTISYMMETRIC;
-    network->key = ascc_allocate(allocator, terms, sizeof *network->key);
+    network->key = ascc_allocate(allocator, terms + 1, sizeof *network->key);
     network->term_key = ascc_allocate(allocator, terms, sizeof *network->term_key);
     network->wants = ascc_allocate(allocator, (size_t)network->value_count, 1);
     network->term_weight = ascc_allocate(allocator, terms, sizeof *network->term_weight);
@@ -152,6 +182,8 @@ ascc_status ascc_network_create(ascc_network *network, const ascc_allocator *all
              t < plan->layer[l].first_term + plan->layer[l].term_count; t++) {
             const ascc_term *term = &plan->term[t];
             network->wants[term->source] |= term->rectify ? WANTS_RECTIFIED : WANTS_RAW;
+            if (term->relative)
+                network->wants[0] |= WANTS_RAW;
             network->term_key[t] =
                 !ascc_term_searches(term)
                     ? -1
@@ -164,6 +196,11 @@ ascc_status ascc_network_create(ascc_network *network, const ascc_allocator *all
         const int32_t set = ascc_network_set(network, output->source);
         network->term_key[plan->term_count] =
             find_key(network, set, set, &output->filter, false, 0.0);
+        if (output->walls.present)
+            network->wall_key = find_key(network, ASCC_SET_FLUID, ASCC_SET_BOUNDARY,
+                                         &output->walls.filter, false, 0.0);
+        if (output->damping || output->walls.damping)
+            network->wants[0] |= WANTS_RAW;
     }
     return ASCC_OK;
 }
@@ -174,7 +211,7 @@ void ascc_network_destroy(ascc_network *network)
     if (!a)
         return;
     const size_t terms = (size_t)network->plan->term_count + 1;
-    ascc_release(a, network->key, terms, sizeof *network->key);
+    ascc_release(a, network->key, terms + 1, sizeof *network->key);
     ascc_release(a, network->term_key, terms, sizeof *network->term_key);
     ascc_release(a, network->wants, (size_t)network->value_count, 1);
     ascc_release(a, network->weights, network->weight_count, sizeof(float));
@@ -227,8 +264,7 @@ static bool take_active(ascc_network_run *run)
     return true;
 }
 
-/* The row of `to` that is the same particle as this row of `from`; false if there is none. */
-static bool shared_row(const ascc_hierarchy *h, int32_t from, int32_t to, size_t row,
+bool ascc_network_shared_row(const ascc_hierarchy *h, int32_t from, int32_t to, size_t row,
                        size_t *shared)
 {
     *shared = row;
@@ -307,7 +343,10 @@ static ascc_status demand_output(ascc_network_run *run)
     if (!fluid)
         return ascc_fail(run->tools->message, ASCC_ERROR_MEMORY, "no memory for the last layer");
     memcpy(fluid, active, h->set[set].count);
-    return demand_rows(run, key, fluid, active);
+    const ascc_status status = demand_rows(run, key, fluid, active);
+    if (status != ASCC_OK || network->wall_key < 0)
+        return status;
+    return ascc_rows_make(&run->rows[network->wall_key], run->tools, fluid);
 }
 
 static ascc_status demand_layer(ascc_network_run *run, int32_t l)
@@ -327,7 +366,7 @@ static ascc_status demand_layer(ascc_network_run *run, int32_t l)
         }
         const int32_t set = ascc_network_set(network, source);
         for (size_t i = 0, j; i < count; i++)
-            if (active[i] && shared_row(run->hierarchy, layer->set, set, i, &j))
+            if (active[i] && ascc_network_shared_row(run->hierarchy, layer->set, set, i, &j))
                 reads[j] = 1;
     }
     return ASCC_OK;
@@ -371,10 +410,11 @@ typedef struct layer_job {
     const uint32_t *list; /* active rows */
     float *scratch;       /* [slots][scratch_size]: columns, a tile of the layer, geometry */
     size_t scratch_size, tile_offset, geometry_offset;
-    size_t room; /* pairs of the longest row */
+    ascc_column_sizes sizes;
+    uint32_t *sequence; /* 0, 1, 2, ... */
 } layer_job;
 
-static const float *source_values(const ascc_network_run *run, const ascc_term *term)
+const float *ascc_network_source(const ascc_network_run *run, const ascc_term *term)
 {
     const ascc_value *value = &run->value[term->source];
     return term->rectify ? value->rectified : value->raw;
@@ -415,42 +455,88 @@ static void normalize_hats(float *hat, size_t count)
         hat[k] /= sum;
 }
 
-/* What a term reads around one row: [cell][inputs]. */
-static void fill_column(const layer_job *job, const ascc_term *term, const ascc_rows *rows,
-                        size_t row, float *column, float *scratch)
+/* Features of a row's neighbours, their motion less the row's own. */
+static void relative_features(const ascc_network_run *run, const ascc_term *term, size_t row,
+                              const uint32_t *neighbor, size_t count, float *to)
 {
-    const ascc_kernels *kernels = job->run->tools->kernels;
+    const ascc_plan *plan = run->network->plan;
+    const size_t a = ascc_padded(term->inputs), own_a = ascc_padded(plan->fluid_channels);
+    const int32_t from = ascc_plan_motion(plan, term->source);
+    const float *own = run->value[0].raw + row * own_a + ascc_plan_motion(plan, 0);
+    const float *feature = run->value[term->source].raw;
+    for (size_t k = 0; k < count; k++, to += a) {
+        memcpy(to, feature + neighbor[k] * a, a * sizeof *to);
+        for (int32_t c = 0; c < plan->dimension; c++)
+            to[from + c] -= own[c];
+    }
+}
+
+ascc_column_scratch ascc_network_scratch(const ascc_column_sizes *sizes, float *memory,
+                                         uint32_t *sequence)
+{
+    return (ascc_column_scratch){memory, memory + ASCC_GEOMETRY_ARRAYS * sizes->room,
+                                 memory + (ASCC_GEOMETRY_ARRAYS + sizes->members) * sizes->room,
+                                 sequence, sizes->room};
+}
+
+ascc_column_sizes ascc_network_sizes(const ascc_network_run *run, const ascc_layer *layer)
+{
+    const ascc_plan *plan = run->network->plan;
+    ascc_column_sizes sizes = {.room = ((size_t)run->longest + 15) / 8 * 8};
+    for (int32_t t = layer->first_term; t < layer->first_term + layer->term_count; t++) {
+        const ascc_term *term = &plan->term[t];
+        const size_t cells = ascc_cell_count(&term->filter);
+        if (!ascc_term_searches(term))
+            continue;
+        sizes.column = ascc_max_size(sizes.column, cells * ascc_padded(term->inputs));
+        if (term->filter.bumps)
+            sizes.members = ascc_max_size(sizes.members, cells);
+        if (term->relative)
+            sizes.relative = ascc_max_size(sizes.relative, ascc_padded(term->inputs));
+    }
+    sizes.scratch = (ASCC_GEOMETRY_ARRAYS + sizes.members + sizes.relative) * sizes.room;
+    return sizes;
+}
+
+void ascc_network_column(const ascc_network_run *run, const ascc_term *term, const ascc_rows *rows,
+                         size_t row, const ascc_column_scratch *scratch, float *column)
+{
+    const ascc_kernels *kernels = run->tools->kernels;
     const ascc_filter *filter = &term->filter;
-    const size_t a = ascc_padded(term->inputs), count = rows->count[row];
-    const uint32_t *neighbor = rows->neighbor + rows->start[row];
-    const float *feature = source_values(job->run, term);
-    const ascc_geometry g =
-        ascc_network_geometry(job->run, rows, filter, row, neighbor, count, scratch, job->room);
+    const size_t a = ascc_padded(term->inputs), count = rows->count[row], room = scratch->room;
+    const uint32_t *neighbor = rows->neighbor + rows->start[row], *read = neighbor;
+    const float *feature = ascc_network_source(run, term);
+    if (term->relative) {
+        relative_features(run, term, row, neighbor, count, scratch->relative);
+        feature = scratch->relative;
+        read = scratch->sequence;
+    }
+    const ascc_geometry g = ascc_network_geometry(run, rows, filter, row, neighbor, count,
+                                                  scratch->geometry, room);
     if (term->kind == ASCC_TERM_TRANSFER) {
         float *hat = g.pairs.window[ASCC_WINDOW_HAT];
         if (term->normalize)
             normalize_hats(hat, count);
-        kernels->gather_basis(hat, job->room, 1, 1, neighbor, count, feature, a, column);
+        kernels->gather_basis(hat, room, 1, 1, read, count, feature, a, column);
     } else if (filter->bumps) {
-        float *factor = scratch + ASCC_GEOMETRY_ARRAYS * job->room;
         const size_t harmonics = (size_t)filter->cells[0], bumps = (size_t)filter->bumps;
-        kernels->basis(&g.pairs, count, bumps, harmonics, factor, job->room);
-        kernels->gather_basis(factor, job->room, bumps, harmonics, neighbor, count, feature, a,
+        kernels->basis(&g.pairs, count, bumps, harmonics, scratch->factor, room);
+        kernels->gather_basis(scratch->factor, room, bumps, harmonics, read, count, feature, a,
                               column);
     } else {
-        kernels->gather(&g.pairs, g.window, neighbor, count, feature, a, filter->cells, column);
+        kernels->gather(&g.pairs, g.window, read, count, feature, a, filter->cells, column);
     }
 }
 
 static void convolve_tile(const layer_job *job, const ascc_term *term, const ascc_rows *rows,
                           const uint32_t *list, size_t n, float *column, float *tile,
-                          float *geometry)
+                          const ascc_column_scratch *scratch)
 {
     const ascc_kernels *kernels = job->run->tools->kernels;
     const size_t a = ascc_padded(term->inputs), width = job->width;
-    const size_t length = cell_count(&term->filter) * a, stride = length + COLUMN_PADDING;
+    const size_t length = ascc_cell_count(&term->filter) * a, stride = length + COLUMN_PADDING;
     for (size_t r = 0; r < n; r++) {
-        fill_column(job, term, rows, list[r], column + r * stride, geometry);
+        ascc_network_column(job->run, term, rows, list[r], scratch, column + r * stride);
         add_bias(term, tile + r * width + term->column);
     }
     kernels->multiply(column, stride, n, length,
@@ -465,9 +551,9 @@ static void pointwise_tile(const layer_job *job, const ascc_term *term, const ui
     const ascc_network_run *run = job->run;
     const int32_t set = ascc_network_set(run->network, term->source);
     const size_t a = ascc_padded(term->inputs), width = job->width;
-    const float *source = source_values(run, term);
+    const float *source = ascc_network_source(run, term);
     for (size_t r = 0, j; r < n; r++) {
-        if (!shared_row(run->hierarchy, job->layer->set, set, list[r], &j))
+        if (!ascc_network_shared_row(run->hierarchy, job->layer->set, set, list[r], &j))
             continue;
         float *row = tile + r * width + term->column;
         const float *from = source + j * a;
@@ -504,6 +590,8 @@ static void compute_tiles(void *data, size_t begin, size_t end, int32_t slot)
     const ascc_plan *plan = job->run->network->plan;
     float *column = job->scratch + (size_t)slot * job->scratch_size;
     float *tile = column + job->tile_offset;
+    const ascc_column_scratch scratch =
+        ascc_network_scratch(&job->sizes, column + job->geometry_offset, job->sequence);
     for (size_t at = begin; at < end; at += TILE_ROWS) {
         const size_t n = ascc_min_size(TILE_ROWS, end - at);
         const uint32_t *list = job->list + at;
@@ -514,7 +602,7 @@ static void compute_tiles(void *data, size_t begin, size_t end, int32_t slot)
             const int32_t key = job->run->network->term_key[t];
             if (key >= 0)
                 convolve_tile(job, term, &job->run->rows[key], list, n, column, tile,
-                              column + job->geometry_offset);
+                              &scratch);
             else
                 pointwise_tile(job, term, list, n, tile);
         }
@@ -558,25 +646,19 @@ static ascc_status compute_layer(ascc_network_run *run, int32_t l, uint32_t *lis
     const ascc_plan *plan = run->network->plan;
     const ascc_layer *layer = &plan->layer[l];
     const ascc_search_tools *tools = run->tools;
-    size_t longest = 0, members = 0;
-    for (int32_t t = layer->first_term; t < layer->first_term + layer->term_count; t++) {
-        const ascc_term *term = &plan->term[t];
-        if (!ascc_term_searches(term))
-            continue;
-        const size_t cells = cell_count(&term->filter);
-        longest = ascc_max_size(longest, cells * ascc_padded(term->inputs) + COLUMN_PADDING);
-        if (term->filter.bumps)
-            members = ascc_max_size(members, cells);
-    }
     layer_job job = {.run = run, .layer = layer, .value = &run->value[l + 2], .list = list};
     const size_t slots = (size_t)ascc_workers_count(tools->workers);
+    job.sizes = ascc_network_sizes(run, layer);
     job.width = ascc_padded(layer->channels) + 8;
-    job.tile_offset = TILE_ROWS * longest;
-    job.room = ((size_t)run->longest + 15) / 8 * 8;
+    job.tile_offset = TILE_ROWS * (job.sizes.column + COLUMN_PADDING);
     job.geometry_offset = job.tile_offset + TILE_ROWS * job.width;
-    job.scratch_size = job.geometry_offset + (ASCC_GEOMETRY_ARRAYS + members) * job.room;
+    job.scratch_size = job.geometry_offset + job.sizes.scratch;
+    const size_t numbers = job.sizes.relative ? job.sizes.room : 0;
+    job.sequence = ascc_arena_take(tools->arena, numbers, sizeof *job.sequence);
+    for (size_t i = 0; job.sequence && i < numbers; i++)
+        job.sequence[i] = (uint32_t)i;
     job.scratch = ascc_arena_take(tools->arena, slots * job.scratch_size, sizeof(float));
-    if (!job.scratch || !take_value(run, l + 2))
+    if (!job.scratch || !job.sequence || !take_value(run, l + 2))
         return ascc_fail(tools->message, ASCC_ERROR_MEMORY, "no memory for layer %s", layer->name);
     size_t count = 0;
     const size_t rows = run->hierarchy->set[layer->set].count;

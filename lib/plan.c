@@ -13,7 +13,8 @@ ascc_status ascc_plan_open(const ascc_allocator *allocator, const ascc_safetenso
                            ascc_plan_builder *builder, ascc_message *message)
 {
     *builder = (ascc_plan_builder){
-        .allocator = *allocator, .file = file, .message = message, .output_tensor = -1};
+        .allocator = *allocator, .file = file, .message = message, .output_tensor = -1,
+                                   .damping_tensor = -1, .wall_tensor = -1, .wall_damping_tensor = -1};
     builder->plan.level_count = 1;
     builder->plan.output.source = -1;
     builder->offset = ascc_allocate(allocator, file->tensor_count, sizeof *builder->offset);
@@ -66,7 +67,8 @@ static ascc_status check_features(ascc_plan_builder *builder, const char *whose,
     if (count < 0 || count > ASCC_MAX_FEATURES)
         return FAIL("%d features of the %s; at most %d", (int)count, whose, ASCC_MAX_FEATURES);
     for (int32_t i = 0; i < count; i++) {
-        if (feature[i] != ASCC_FEATURE_ONE && feature[i] != (int32_t)vector)
+        if (feature[i] != ASCC_FEATURE_ONE && feature[i] != ASCC_FEATURE_MOTION &&
+            feature[i] != (int32_t)vector)
             return FAIL("a feature that the %s does not have", whose);
         for (int32_t j = 0; j < i; j++)
             if (feature[i] == feature[j])
@@ -303,6 +305,18 @@ static ascc_status check_transfer(ascc_plan_builder *builder, ascc_term *term, i
     return ASCC_OK;
 }
 
+static ascc_status check_relative(ascc_plan_builder *builder, const ascc_term *term,
+                                  const ascc_layer *layer)
+{
+    const ascc_plan *plan = &builder->plan;
+    if (term->source > 1 || layer->set != ASCC_SET_FLUID || term->rectify ||
+        ascc_plan_motion(plan, 0) < 0 || ascc_plan_motion(plan, term->source) < 0)
+        return FAIL("layer '%s': 'relative' is for convolutions of the features 'motion', without "
+                    "'relu', on the points 'fluid'",
+                    ascc_quote(layer->name).text);
+    return ASCC_OK;
+}
+
 static ascc_status check_term(ascc_plan_builder *builder, ascc_plan_term *entry, const char *weight,
                               const char *bias)
 {
@@ -322,11 +336,12 @@ static ascc_status check_term(ascc_plan_builder *builder, ascc_plan_term *entry,
     if (!ascc_term_searches(term) && !share_rows(source_set, layer->set))
         return FAIL("layer '%s': a source that shares no points with the layer", name.text);
 
-    if (term->kind == ASCC_TERM_TRANSFER) {
+    if (term->kind == ASCC_TERM_TRANSFER)
         status = check_transfer(builder, term, source_set, layer);
-        if (status != ASCC_OK)
-            return status;
-    }
+    else if (term->relative)
+        status = check_relative(builder, term, layer);
+    if (status != ASCC_OK)
+        return status;
 
     if (weight) {
         const bool convolution = term->kind == ASCC_TERM_CONVOLUTION;
@@ -394,32 +409,70 @@ static ascc_status check_output_grid(ascc_plan_builder *builder, ascc_output *ow
     return status == ASCC_OK ? check_cells(builder, tensor, storage, own->filter.cells) : status;
 }
 
-/* Central impulses need one scale for all directions. */
-static ascc_status check_output_basis(ascc_plan_builder *builder, ascc_output *own,
-                                      const char *weight)
+/* A tensor [bump][inputs] of a central output, whose basis is made cells here. */
+static ascc_status check_central(ascc_plan_builder *builder, const ascc_output *own,
+                                 ascc_filter *filter, const char *name, int32_t *index)
 {
-    const ascc_status status = find_tensor(builder, weight, 2, &builder->output_tensor);
+    const ascc_status status = find_tensor(builder, name, 2, index);
     if (status != ASCC_OK)
         return status;
-    const ascc_tensor *tensor = &builder->file->tensor[builder->output_tensor];
-    if (tensor->shape[0] != (size_t)own->filter.bumps || tensor->shape[1] != (size_t)own->inputs)
+    const ascc_tensor *tensor = &builder->file->tensor[*index];
+    if (tensor->shape[0] != (size_t)filter->bumps || tensor->shape[1] != (size_t)own->inputs)
         return FAIL("tensor '%s' has the shape [%zu, %zu], but must have [%d, %d]: bumps, channels",
                     ascc_quote(tensor->name).text, tensor->shape[0], tensor->shape[1],
-                    (int)own->filter.bumps, (int)own->inputs);
-    for (int32_t i = 1; i < builder->plan.dimension; i++)
-        if (own->scale[i] != own->scale[0])
-            return FAIL("output: with a basis 'scale' must be the same in all directions");
-    const int32_t cells[3] = {1, own->filter.bumps, 1};
-    memcpy(own->filter.cells, cells, sizeof cells);
-    own->filter.mapping = ASCC_MAPPING_DIRECTION;
-    own->filter.window = ASCC_WINDOW_NONE;
-    own->radial = 1;
-    builder->output_storage = ASCC_FULL;
+                    (int)filter->bumps, (int)own->inputs);
+    const int32_t cells[3] = {1, filter->bumps, 1};
+    memcpy(filter->cells, cells, sizeof cells);
+    filter->mapping = ASCC_MAPPING_DIRECTION;
+    filter->window = ASCC_WINDOW_NONE;
     return ASCC_OK;
 }
 
+/* What an output with a basis may have besides: each needs one particle's values for each fluid row. */
+static ascc_status check_central_parts(ascc_plan_builder *builder, ascc_output *own,
+                                       const ascc_output_names *names)
+{
+    const bool damped = names->damping || names->wall_damping;
+    const int32_t set = ascc_plan_value_set(builder->layer, own->source);
+    if ((own->walls.present || damped || own->current_direction) && set != ASCC_SET_FLUID)
+        return FAIL("output: 'walls', 'damping' and 'direction' need a source on the points 'fluid'");
+    if (damped && (!own->rectify || ascc_plan_motion(&builder->plan, 0) < 0))
+        return FAIL("output: 'damping' needs 'relu' and the feature 'motion'");
+    ascc_status status = ASCC_OK;
+    if (names->damping)
+        status = check_central(builder, own, &own->filter, names->damping, &builder->damping_tensor);
+    if (status != ASCC_OK || !own->walls.present)
+        return status;
+    status = check_filter(builder, &own->walls.filter, "output 'walls'");
+    if (status == ASCC_OK && own->walls.filter.bumps == 0)
+        return FAIL("output 'walls': a basis is missing");
+    if (status == ASCC_OK)
+        status = check_central(builder, own, &own->walls.filter, names->wall_weight,
+                               &builder->wall_tensor);
+    if (status == ASCC_OK && names->wall_damping)
+        status = check_central(builder, own, &own->walls.filter, names->wall_damping,
+                               &builder->wall_damping_tensor);
+    return status;
+}
+
+/* Central impulses need one scale for all directions. */
+static ascc_status check_output_basis(ascc_plan_builder *builder, ascc_output *own,
+                                      const ascc_output_names *names)
+{
+    const ascc_status status =
+        check_central(builder, own, &own->filter, names->weight, &builder->output_tensor);
+    if (status != ASCC_OK)
+        return status;
+    for (int32_t i = 1; i < builder->plan.dimension; i++)
+        if (own->scale[i] != own->scale[0])
+            return FAIL("output: with a basis 'scale' must be the same in all directions");
+    own->radial = 1;
+    builder->output_storage = ASCC_FULL;
+    return check_central_parts(builder, own, names);
+}
+
 ascc_status ascc_plan_set_output(ascc_plan_builder *builder, const ascc_output *output,
-                                 const char *weight, int32_t storage)
+                                 const ascc_output_names *names, int32_t storage)
 {
     ascc_plan *plan = &builder->plan;
     plan->output = *output;
@@ -445,8 +498,9 @@ ascc_status ascc_plan_set_output(ascc_plan_builder *builder, const ascc_output *
         own->filter.skip_self = 1;
         status = check_filter(builder, &own->filter, "output");
         if (status == ASCC_OK)
-            status = own->filter.bumps ? check_output_basis(builder, own, weight)
-                                       : check_output_grid(builder, own, weight, storage, &outputs);
+            status = own->filter.bumps
+                         ? check_output_basis(builder, own, names)
+                         : check_output_grid(builder, own, names->weight, storage, &outputs);
         if (status != ASCC_OK || own->filter.bumps)
             return status;
     }
@@ -501,6 +555,26 @@ static bool is_antisymmetric(const float *kernel, size_t cells, size_t values)
     return true;
 }
 
+/* Damping must not give energy: none of its weights is negative. */
+static ascc_status fill_central_parts(ascc_plan_builder *builder, ascc_output *output,
+                                      const float *weights)
+{
+    const int32_t index[3] = {builder->damping_tensor, builder->wall_damping_tensor,
+                              builder->wall_tensor};
+    const float **part[3] = {&output->damping, &output->walls.damping, &output->walls.weight};
+    for (int i = 0; i < 3; i++) {
+        if (index[i] < 0)
+            continue;
+        const ascc_tensor *tensor = &builder->file->tensor[index[i]];
+        *part[i] = weights + builder->offset[index[i]];
+        for (size_t k = 0; i < 2 && k < tensor->count; k++)
+            if ((*part[i])[k] < 0.0f)
+                return FAIL("tensor '%s' has a negative number, but damps",
+                            ascc_quote(tensor->name).text);
+    }
+    return ASCC_OK;
+}
+
 static ascc_status fill_output(ascc_plan_builder *builder, ascc_plan *plan, float *weights,
                                size_t at)
 {
@@ -511,7 +585,7 @@ static ascc_status fill_output(ascc_plan_builder *builder, ascc_plan *plan, floa
     const float *stored = weights + builder->offset[builder->output_tensor];
     output->weight = stored;
     if (output->filter.bumps)
-        return ASCC_OK;
+        return fill_central_parts(builder, output, weights);
     const size_t size = kernel_size(output, plan->dimension);
     const size_t values = (size_t)output->inputs * (size_t)plan->dimension;
     if (builder->output_storage != ASCC_FULL) {
@@ -641,8 +715,9 @@ double ascc_plan_receptive_radius(const ascc_plan *plan)
         }
         reach[i + 2] = farthest;
     }
-    const double last =
-        plan->output.kind == ASCC_OUTPUT_ANTISYMMETRIC ? plan->output.filter.radius : 0.0;
+    const double last = plan->output.kind == ASCC_OUTPUT_ANTISYMMETRIC
+                            ? fmax(plan->output.filter.radius, plan->output.walls.filter.radius)
+                            : 0.0;
     return last + reach[plan->output.source];
 }
 

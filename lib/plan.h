@@ -34,6 +34,7 @@ typedef struct ascc_plan_builder {
     ascc_plan_term *term;
     size_t term_capacity;
     int32_t output_tensor, output_storage;
+    int32_t damping_tensor, wall_tensor, wall_damping_tensor; /* -1 = none */
     size_t *offset; /* of each tensor in the weights; SIZE_MAX = not used */
 } ascc_plan_builder;
 
@@ -53,9 +54,13 @@ ascc_status ascc_plan_add_layer(ascc_plan_builder *builder, const char *name, in
  * = no tensor. */
 ascc_status ascc_plan_add_term(ascc_plan_builder *builder, const ascc_term *term,
                                const char *weight, const char *bias);
-/* `inputs`, `filter.cells` are found here; weight NULL for a plain output. */
+/* Tensors of an output; NULL = none. */
+typedef struct ascc_output_names {
+    const char *weight, *damping, *wall_weight, *wall_damping;
+} ascc_output_names;
+/* `inputs`, `filter.cells` are found here; no weight for a plain output. */
 ascc_status ascc_plan_set_output(ascc_plan_builder *builder, const ascc_output *output,
-                                 const char *weight, int32_t storage);
+                                 const ascc_output_names *names, int32_t storage);
 
 /* Value of that name ("fluid", "boundary" or a layer's), -1 = none; its set and channels. */
 int32_t ascc_plan_find_value(const ascc_plan_builder *builder, const char *name);

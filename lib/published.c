@@ -260,7 +260,8 @@ static void finish_output(published *p, const ascc_output *output, const char *k
                           int32_t storage)
 {
     if (p->reader.status == ASCC_OK)
-        p->reader.status = ascc_plan_set_output(p->builder, output, kernel, storage);
+        p->reader.status = ascc_plan_set_output(
+            p->builder, output, &(ascc_output_names){.weight = kernel}, storage);
 }
 
 static void begin_layers(published *p)

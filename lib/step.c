@@ -143,15 +143,19 @@ static double lap(double *since)
 
 /* ---- What the network sees ---- */
 
+/* vector: m/s of fluid, a normal of boundary, in units of `factor`; motion: the factor that makes of it
+ * spacings a time step. */
 static void features_of(const ascc_plan *plan, const int32_t *feature, int32_t feature_count,
-                        const double *vector, double factor, float *to)
+                        const double *vector, double factor, double motion, float *to)
 {
-    for (int32_t f = 0; f < feature_count; f++)
+    for (int32_t f = 0; f < feature_count; f++) {
+        const double scale = feature[f] == ASCC_FEATURE_MOTION ? motion : factor;
         if (feature[f] == ASCC_FEATURE_ONE)
             *to++ = 1.0f;
         else
             for (int32_t c = 0; c < plan->dimension; c++)
-                *to++ = (float)(vector[c] * factor);
+                *to++ = (float)(vector[c] * scale);
+    }
 }
 
 /* Features of all particles in the host's order; vectors in metres. */
@@ -165,13 +169,14 @@ static bool take_features(const ascc_step *step, ascc_arena *arena, const ascc_p
         ascc_arena_take(arena, p->boundary_count, (size_t)plan->boundary_channels * sizeof(float));
     if (!*fluid || !*boundary)
         return false;
+    const double motion = step->length_unit * plan->time_step / plan->spacing;
     for (size_t i = 0; i < p->fluid_count; i++)
         features_of(plan, plan->fluid_features, plan->fluid_feature_count,
-                    advance->velocity + i * d, step->length_unit,
+                    advance->velocity + i * d, step->length_unit, motion,
                     *fluid + i * (size_t)plan->fluid_channels);
     for (size_t i = 0; i < p->boundary_count; i++)
         features_of(plan, plan->boundary_features, plan->boundary_feature_count,
-                    p->wall_normal + i * d, 1.0, *boundary + i * (size_t)plan->boundary_channels);
+                    p->wall_normal + i * d, 1.0, 0.0, *boundary + i * (size_t)plan->boundary_channels);
     return true;
 }
 
@@ -189,7 +194,8 @@ static double *scaled(ascc_arena *arena, const double *position, size_t count, d
 static ascc_impulse_scale impulse_scale(const ascc_step *step, const ascc_particles *p)
 {
     const ascc_plan *plan = &step->model->plan;
-    ascc_impulse_scale scale = {.mass = p->mass};
+    ascc_impulse_scale scale = {
+        .mass = p->mass, .position = p->position, .wall_position = p->wall_position};
     for (int c = 0; c < 3; c++)
         scale.factor[c] = plan->output.scale[c] / plan->time_step *
                           (step->time_step / plan->time_step) / step->length_unit / p->quantum;

@@ -181,7 +181,8 @@ static void run_small(small_case *s, test_tools *t, double *got)
         int64_t *impulse = calloc(s->query_count * 3, sizeof *impulse);
         for (size_t i = 0; i < s->query_count; i++)
             mass[i] = 1.0;
-        const ascc_impulse_scale scale = {mass, {1.0 / unit, 1.0 / unit, 1.0 / unit}};
+        const ascc_impulse_scale scale = {.mass = mass,
+                                          .factor = {1.0 / unit, 1.0 / unit, 1.0 / unit}};
         const ascc_impulses impulses = {impulse, NULL};
         uint64_t pairs;
         assert_int_equal(ascc_antisymmetric_impulses(&run, &scale, &impulses, &pairs), ASCC_OK);
