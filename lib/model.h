@@ -111,6 +111,8 @@ typedef struct ascc_output {
     /* antisymmetric: the whole kernel [z][y][x][inputs][dimension]; with a basis [bump][inputs], whose
      * pair terms lie on the line between the particles by themselves */
     const float *weight;
+    const float *half; /* what `weight` is made of, if half of it is stored; else NULL */
+    int32_t half_axis, reserved;
     const float *damping; /* [bump][inputs], none negative, times the pair's speed of approach; or NULL */
     ascc_wall_output walls;
     double scale[3]; /* metres of position correction in one time step per unit of output */

@@ -546,6 +546,13 @@ static void expand_half(const ascc_output *output, int32_t dimension, int32_t st
             }
 }
 
+void ascc_plan_expand(const ascc_plan *plan, float *whole)
+{
+    if (plan->output.half)
+        expand_half(&plan->output, plan->dimension, plan->output.half_axis, plan->output.half,
+                    whole);
+}
+
 static bool is_antisymmetric(const float *kernel, size_t cells, size_t values)
 {
     for (size_t c = 0; c < (cells + 1) / 2; c++)
@@ -589,8 +596,10 @@ static ascc_status fill_output(ascc_plan_builder *builder, ascc_plan *plan, floa
     const size_t size = kernel_size(output, plan->dimension);
     const size_t values = (size_t)output->inputs * (size_t)plan->dimension;
     if (builder->output_storage != ASCC_FULL) {
-        expand_half(output, plan->dimension, builder->output_storage, stored, weights + at);
+        output->half = stored;
+        output->half_axis = builder->output_storage;
         output->weight = weights + at;
+        ascc_plan_expand(plan, weights + at);
     } else if (!is_antisymmetric(stored, size / values, values)) {
         return FAIL("tensor '%s' is not antisymmetric under point mirroring",
                     ascc_quote(tensor->name).text);

@@ -71,6 +71,9 @@ int32_t ascc_plan_value_channels(const ascc_plan *plan, const ascc_layer *layer,
  * ascc_plan_release. */
 ascc_status ascc_plan_finish(ascc_plan_builder *builder, ascc_plan *plan, float **weights,
                              size_t *weight_count);
+/* Makes the whole kernel of an output of which half is stored. */
+void ascc_plan_expand(const ascc_plan *plan, float *whole);
+
 void ascc_plan_release(const ascc_allocator *allocator, ascc_plan *plan, float *weights,
                        size_t weight_count);
 

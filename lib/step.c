@@ -1,28 +1,15 @@
 /* One time step from beginning to end: validate, compute, commit. SPDX-License-Identifier: MIT */
+#include "step.h"
+
 #include <inttypes.h>
 #include <math.h>
 #include <string.h>
 #include <time.h>
 
-#include "antisymmetric.h"
 #include "arrays.h"
 #include "estimate.h"
-#include "integrate.h"
 
 #define DEFAULT_MAX_NEIGHBORS 4096
-
-struct ascc_step {
-    uint32_t magic;
-    ascc_context *context; /* retained */
-    ascc_model *model;     /* retained */
-    double time_step, length_unit, max_displacement;
-    ascc_network network;
-    ascc_arena arena;
-    double *acceleration; /* the host's, [fluid][dimension] */
-    size_t acceleration_capacity;
-    ascc_step_statistics statistics;
-    ascc_message message;
-};
 
 _Static_assert(sizeof(void *) != 8 || sizeof(ascc_step_options) == 40, "released layout");
 _Static_assert(sizeof(void *) != 8 || sizeof(ascc_forces) == 24, "released layout");
@@ -232,14 +219,16 @@ static bool take_advance(ascc_advance *advance, ascc_impulses *impulses, ascc_ar
 }
 
 /* Hierarchy, demand, layers, pair impulses: everything the model does. */
-static ascc_status run_network(ascc_step *step, const ascc_search_tools *tools,
-                               const ascc_particles *p, const ascc_advance *advance,
-                               const ascc_impulses *impulses, double *since)
+static ascc_status run_network(ascc_step *step, const ascc_particles *p, ascc_step_trace *trace,
+                               double *since)
 {
+    const ascc_search_tools *tools = &trace->tools;
+    const ascc_advance *advance = &trace->advance;
+    const ascc_impulses *impulses = &trace->impulses;
+    ascc_hierarchy *hierarchy = &trace->hierarchy;
+    ascc_network_run *run = &trace->run;
     ascc_step_statistics *s = &step->statistics;
     const size_t d = (size_t)p->dimension;
-    ascc_hierarchy hierarchy;
-    ascc_network_run run;
     float *fluid, *boundary;
     ascc_scene scene = {.fluid_count = p->fluid_count, .boundary_count = p->boundary_count};
     scene.fluid = scaled(tools->arena, advance->position, p->fluid_count * d, step->length_unit);
@@ -250,13 +239,13 @@ static ascc_status run_network(ascc_step *step, const ascc_search_tools *tools,
         return ascc_fail(tools->message, ASCC_ERROR_MEMORY, "no memory for the features");
     s->seconds_prepare = lap(since);
 
-    ascc_status status = ascc_hierarchy_build(&hierarchy, tools, &step->model->plan, &scene);
+    ascc_status status = ascc_hierarchy_build(hierarchy, tools, &step->model->plan, &scene);
     s->seconds_hierarchy = lap(since);
     if (status == ASCC_OK)
-        status = ascc_network_demand(&run, &step->network, &hierarchy, tools);
+        status = ascc_network_demand(run, &step->network, hierarchy, tools);
     s->seconds_search = lap(since);
     if (status == ASCC_OK)
-        status = ascc_network_forward(&run, fluid, boundary);
+        status = ascc_network_forward(run, fluid, boundary);
     s->seconds_network = lap(since);
     if (status != ASCC_OK)
         return status;
@@ -264,15 +253,15 @@ static ascc_status run_network(ascc_step *step, const ascc_search_tools *tools,
     const ascc_impulse_scale scale = impulse_scale(step, p);
     s->pair_count = 0;
     if (step->model->plan.output.kind == ASCC_OUTPUT_ANTISYMMETRIC)
-        status = ascc_antisymmetric_impulses(&run, &scale, impulses, &s->pair_count);
+        status = ascc_antisymmetric_impulses(run, &scale, impulses, &s->pair_count);
     else
-        status = ascc_plain_impulses(&run, &scale, impulses);
+        status = ascc_plain_impulses(run, &scale, impulses);
     s->seconds_last_layer = lap(since);
-    s->neighbor_count = run.neighbor_count;
-    s->max_neighbors = run.longest;
-    s->level_points[0] = hierarchy.set[ASCC_SET_ALL].count;
+    s->neighbor_count = run->neighbor_count;
+    s->max_neighbors = run->longest;
+    s->level_points[0] = hierarchy->set[ASCC_SET_ALL].count;
     for (int32_t l = 1; l < step->model->plan.level_count; l++)
-        s->level_points[l] = hierarchy.set[ASCC_SET_LEVEL + l - 1].count;
+        s->level_points[l] = hierarchy->set[ASCC_SET_LEVEL + l - 1].count;
     return status;
 }
 
@@ -294,29 +283,30 @@ static void commit(ascc_step *step, ascc_particles *p, const ascc_advance *advan
         memcpy(p->wall_impulse, impulses->wall, p->boundary_count * d * sizeof(int64_t));
 }
 
-static ascc_status run_once(ascc_step *step, ascc_particles *p, const ascc_motion *motion)
+ascc_status ascc_step_once(ascc_step *step, ascc_particles *p, const ascc_motion *motion,
+                           ascc_arena *arena, ascc_step_trace *trace)
 {
     double since = now();
     const double begin = since;
-    ascc_arena_reset(&step->arena);
-    const ascc_search_tools tools = {&step->arena, step->context->workers, &step->context->kernels,
-                                     &step->message};
-    ascc_advance advance;
-    ascc_impulses impulses;
-    if (!take_advance(&advance, &impulses, &step->arena, p))
+    ascc_arena_reset(arena);
+    trace->tools = (ascc_search_tools){arena, step->context->workers, &step->context->kernels,
+                                       &step->message};
+    ascc_advance *advance = &trace->advance;
+    ascc_impulses *impulses = &trace->impulses;
+    if (!take_advance(advance, impulses, arena, p))
         return ascc_fail(&step->message, ASCC_ERROR_MEMORY, "no memory for %zu particles",
                          p->fluid_count);
-    ascc_status status = ascc_integrate_begin(p, motion, &advance, &step->message);
+    ascc_status status = ascc_integrate_begin(p, motion, advance, &step->message);
     if (status == ASCC_OK && p->fluid_count)
-        status = run_network(step, &tools, p, &advance, &impulses, &since);
+        status = run_network(step, p, trace, &since);
     if (status == ASCC_OK)
-        status = ascc_integrate_end(p, motion, impulses.fluid, &advance, &step->message);
+        status = ascc_integrate_end(p, motion, impulses->fluid, advance, &step->message);
     if (status != ASCC_OK)
         return status;
-    commit(step, p, &advance, &impulses);
+    commit(step, p, advance, impulses);
     step->statistics.seconds_commit = lap(&since);
     step->statistics.seconds_total = since - begin;
-    step->statistics.scratch_size = ascc_arena_size(&step->arena);
+    step->statistics.scratch_size = ascc_arena_size(arena);
     return ASCC_OK;
 }
 
@@ -360,6 +350,7 @@ ascc_status ascc_step_run(ascc_step *step, ascc_particles *particles, const ascc
     if (!step || step->magic != ASCC_STEP_MAGIC)
         return ASCC_ERROR_ARGUMENT;
     step->statistics.steps = 0;
+    ascc_step_trace trace;
     ascc_status status = ASCC_OK;
     ascc_motion motion = {.time_step = step->time_step,
                           .advection = step->model->plan.advection,
@@ -375,7 +366,7 @@ ascc_status ascc_step_run(ascc_step *step, ascc_particles *particles, const ascc
     else
         status = read_forces(step, particles, forces, &motion);
     for (int32_t n = 0; status == ASCC_OK && n < count; n++) {
-        status = run_once(step, particles, &motion);
+        status = ascc_step_once(step, particles, &motion, &step->arena, &trace);
         if (status == ASCC_OK)
             step->statistics.steps++;
     }

@@ -1,0 +1,52 @@
+/* Sequences as the trainer keeps them, and what it makes of them before a rollout.
+ * SPDX-License-Identifier: MIT */
+#ifndef ASCC_TRAIN_DATA_H
+#define ASCC_TRAIN_DATA_H
+
+#include <ascc/train.h>
+
+#include "../model.h"
+#include "../neighbors.h"
+
+typedef struct ascc_sequence {
+    char name[128];
+    size_t frame_count, fluid_count, boundary_count;
+    int32_t dimension, reserved;
+    float *position, *wall, *normal; /* [frame][fluid][d], [boundary][d] */
+    double gravity[3], share;
+    uint16_t *near;    /* [frame][fluid]: other fluid particles within the support radius */
+    double near_mean;  /* over all frames */
+    double dense;      /* rho_95 of docs/training.md */
+    double wall_depth; /* s_05, m */
+} ascc_sequence;
+
+/* Copies and measures. tools: an arena that is reset. errors: ARGUMENT, MEMORY, MISMATCH, NOT_FINITE. */
+ascc_status ascc_sequence_create(ascc_sequence *sequence, const ascc_allocator *allocator,
+                                 const ascc_plan *plan, const ascc_training_sequence *given,
+                                 const ascc_search_tools *tools);
+void ascc_sequence_destroy(ascc_sequence *sequence, const ascc_allocator *allocator);
+
+/* A motion of the whole scene: x -> turn x + shift. */
+typedef struct ascc_placement {
+    double turn[3][3], shift[3];
+} ascc_placement;
+
+ascc_placement ascc_placement_none(void);
+/* to[count][d] = the placed points; vectors are turned only. */
+void ascc_placement_apply(const ascc_placement *placement, int32_t dimension, const float *from,
+                          size_t count, bool vectors, double *to);
+
+/* A stream of random numbers that depends on its three numbers alone. */
+typedef struct ascc_random {
+    uint64_t state;
+} ascc_random;
+ascc_random ascc_random_open(uint64_t seed, uint64_t iteration, uint64_t rollout);
+double ascc_random_uniform(ascc_random *random); /* [0, 1) */
+double ascc_random_normal(ascc_random *random);
+
+/* A turn about gravity (without gravity: about any axis), a mirror in a plane along it, and a shift
+ * within a cube of this edge. */
+ascc_placement ascc_placement_draw(ascc_random *random, const ascc_sequence *sequence, bool rotate,
+                                   bool mirror, double edge);
+
+#endif

@@ -1,0 +1,20 @@
+/* Who is near whom among the particles of a loss. SPDX-License-Identifier: MIT */
+#ifndef ASCC_TRAIN_NEAR_H
+#define ASCC_TRAIN_NEAR_H
+
+#include "../neighbors.h"
+
+/* Neighbours of query row i: rows->neighbor[rows->start[i] ..] of the source. */
+typedef struct ascc_near {
+    ascc_points points[2]; /* query, source */
+    ascc_grid grid[2];
+    ascc_rows rows;
+} ascc_near;
+
+/* positions [count][dimension], m; source NULL = the queries themselves, each its own neighbour, too.
+ * errors: MEMORY, RANGE. */
+ascc_status ascc_near_find(ascc_near *near, const ascc_search_tools *tools, int32_t dimension,
+                           double radius, const double *query, size_t query_count,
+                           const double *source, size_t source_count);
+
+#endif

@@ -1,0 +1,324 @@
+/* One rollout: steps forwards with the run-time's own step, the loss, and the way back.
+ * SPDX-License-Identifier: MIT */
+#include "rollout.h"
+
+#include <math.h>
+#include <string.h>
+
+/* Steps without gradient have blown up where particles are this far off on average, spacings. */
+#define BLOWN_UP 2.0
+
+bool ascc_rollout_worker_open(ascc_rollout_worker *w, ascc_context *context,
+                              const ascc_model *model, int32_t longest_horizon)
+{
+    memset(w, 0, sizeof *w);
+    w->context = context;
+    w->model = model;
+    w->kept_count = (size_t)longest_horizon;
+    ascc_train_kernels_select(&w->kernels, context->cpu);
+    ascc_arena_open(&w->scratch, &context->allocator);
+    ascc_arena_open(&w->loss_scratch, &context->allocator);
+    w->kept = ascc_allocate(&context->allocator, w->kept_count, sizeof *w->kept);
+    w->trace = ascc_allocate(&context->allocator, w->kept_count, sizeof *w->trace);
+    for (size_t i = 0; w->kept && i < w->kept_count; i++)
+        ascc_arena_open(&w->kept[i], &context->allocator);
+    if (w->kept && w->trace && ascc_step_create(context, model, NULL, &w->step) == ASCC_OK)
+        return true;
+    ascc_rollout_worker_close(w);
+    return false;
+}
+
+void ascc_rollout_worker_close(ascc_rollout_worker *w)
+{
+    if (!w->context)
+        return;
+    const ascc_allocator *allocator = &w->context->allocator;
+    ascc_step_destroy(&w->step);
+    for (size_t i = 0; w->kept && i < w->kept_count; i++)
+        ascc_arena_close(&w->kept[i]);
+    if (w->kept)
+        ascc_release(allocator, w->kept, w->kept_count, sizeof *w->kept);
+    if (w->trace)
+        ascc_release(allocator, w->trace, w->kept_count, sizeof *w->trace);
+    if (w->memory)
+        ascc_release(allocator, w->memory, w->memory_count, sizeof *w->memory);
+    ascc_arena_close(&w->scratch);
+    ascc_arena_close(&w->loss_scratch);
+    memset(w, 0, sizeof *w);
+}
+
+/* A rollout under way. Arrays are [fluid][dimension] unless said. */
+typedef struct rollout {
+    ascc_rollout_worker *worker;
+    const ascc_transposed *transposed;
+    const ascc_rollout_task *task;
+    const ascc_plan *plan;
+    ascc_particles *particles;
+    ascc_motion motion;
+    size_t numbers, walls;      /* coordinates of the fluid, of the walls */
+    double *wall, *normal;      /* [boundary][dimension] */
+    double *truth;
+    double *state;              /* [horizon + 1] positions before each step, and after the last */
+    int64_t *momentum;          /* [horizon] before each step */
+    double *by_position, *by_velocity, *seen, *place, *velocity;
+    size_t first_frame; /* of the first step with gradient: state 0 is there */
+} rollout;
+
+static bool take_memory(rollout *r)
+{
+    ascc_rollout_worker *w = r->worker;
+    const size_t states = (size_t)r->task->horizon + 1, n = r->numbers;
+    const size_t count = 2 * r->walls + n + 2 * states * n + 5 * n;
+    void *memory = w->memory;
+    if (!ascc_grow(&w->context->allocator, &memory, &w->memory_count, count, sizeof *w->memory))
+        return false;
+    double *at = w->memory = memory;
+    double **const part[] = {&r->by_position, &r->by_velocity, &r->seen, &r->place, &r->velocity};
+    r->wall = at;
+    r->normal = at += r->walls;
+    r->truth = at += r->walls;
+    r->state = at += n;
+    at += states * n;
+    r->momentum = (int64_t *)(void *)at;
+    at += states * n;
+    for (size_t i = 0; i < sizeof part / sizeof *part; i++, at += n)
+        *part[i] = at;
+    return true;
+}
+
+static void truth_at(const rollout *r, size_t frame, double *to)
+{
+    const ascc_sequence *s = r->task->sequence;
+    ascc_placement_apply(&r->task->placement, s->dimension, s->position + frame * r->numbers,
+                         s->fluid_count, false, to);
+}
+
+/* Puts the particles where the sequence has them, with velocities by frame difference. */
+static void start_at(rollout *r, size_t frame, ascc_random *random)
+{
+    ascc_particles *p = r->particles;
+    const double dt = r->motion.time_step, jitter = r->task->jitter;
+    truth_at(r, frame - 1, r->truth);
+    truth_at(r, frame, p->position);
+    for (size_t k = 0; k < r->numbers; k++) {
+        double velocity = (p->position[k] - r->truth[k]) / dt;
+        if (jitter > 0.0) {
+            p->position[k] += jitter * ascc_random_normal(random);
+            velocity += jitter / dt * ascc_random_normal(random);
+        }
+        (void)ascc_to_quanta(p->mass[k / (size_t)p->dimension] * velocity, p->quantum,
+                             &p->momentum[k]);
+    }
+}
+
+static ascc_status open_particles(rollout *r)
+{
+    const ascc_sequence *s = r->task->sequence;
+    const ascc_particles_options options = {.size = sizeof options,
+                                            .dimension = s->dimension,
+                                            .spacing = r->plan->spacing,
+                                            .fluid_capacity = s->fluid_count,
+                                            .boundary_capacity = s->boundary_count};
+    ascc_placement_apply(&r->task->placement, s->dimension, s->wall, s->boundary_count, false,
+                         r->wall);
+    ascc_placement_apply(&r->task->placement, s->dimension, s->normal, s->boundary_count, true,
+                         r->normal);
+    truth_at(r, r->task->frame, r->truth);
+    const ascc_const_array position = {.data = r->truth, .scalar = ASCC_DOUBLE};
+    const ascc_const_array wall = {.data = r->wall, .scalar = ASCC_DOUBLE};
+    const ascc_const_array normal = {.data = r->normal, .scalar = ASCC_DOUBLE};
+    ascc_status status = ascc_particles_create(r->worker->context, &options, &r->particles);
+    if (status == ASCC_OK)
+        status = ascc_particles_add_fluid(r->particles, s->fluid_count, &position, NULL, NULL, NULL);
+    if (status == ASCC_OK && s->boundary_count)
+        status =
+            ascc_particles_add_boundary(r->particles, s->boundary_count, &wall, &normal, 0, NULL);
+    return status;
+}
+
+/* A step into this arena. */
+static ascc_status step_into(rollout *r, size_t arena)
+{
+    return ascc_step_once(r->worker->step, r->particles, &r->motion, &r->worker->kept[arena],
+                          &r->worker->trace[arena]);
+}
+
+static bool blown_up(const rollout *r, size_t frame)
+{
+    const size_t d = (size_t)r->plan->dimension;
+    double sum = 0.0;
+    truth_at(r, frame, r->truth);
+    for (size_t i = 0; i < r->numbers; i += d) {
+        double square = 0.0;
+        for (size_t c = 0; c < d; c++)
+            square += (r->particles->position[i + c] - r->truth[i + c]) *
+                      (r->particles->position[i + c] - r->truth[i + c]);
+        sum += sqrt(square);
+    }
+    return !(sum * (double)d <= BLOWN_UP * r->plan->spacing * (double)r->numbers);
+}
+
+/* Steps without gradient; where they blow up, the rest begins at the true state. */
+static void prepare(rollout *r, ascc_rollout_result *result)
+{
+    ascc_random random = r->task->random;
+    start_at(r, r->task->frame, &random);
+    r->first_frame = r->task->frame;
+    for (int32_t w = 0; w < r->task->presteps; w++) {
+        const ascc_status status = step_into(r, 0);
+        r->first_frame++;
+        result->steps++;
+        if (status == ASCC_OK && !blown_up(r, r->first_frame))
+            continue;
+        result->ended_early = true;
+        start_at(r, r->first_frame, &random);
+        return;
+    }
+}
+
+static void keep_state(rollout *r, size_t t)
+{
+    memcpy(r->state + t * r->numbers, r->particles->position, r->numbers * sizeof *r->state);
+    memcpy(r->momentum + t * r->numbers, r->particles->momentum, r->numbers * sizeof *r->momentum);
+}
+
+static void restore_state(rollout *r, size_t t)
+{
+    memcpy(r->particles->position, r->state + t * r->numbers, r->numbers * sizeof *r->state);
+    memcpy(r->particles->momentum, r->momentum + t * r->numbers, r->numbers * sizeof *r->momentum);
+}
+
+/* Steps whose arenas are kept: the last ones, as many as fit. */
+static size_t count_kept(const rollout *r, size_t horizon)
+{
+    const size_t size = ascc_arena_size(&r->worker->kept[0]) + 1;
+    const size_t fit = r->task->memory_limit / size;
+    return fit < 1 ? 1 : fit < horizon ? fit : horizon;
+}
+
+static ascc_status loss_at(rollout *r, size_t t, size_t horizon, double *loss, double *gradient)
+{
+    ascc_message message;
+    const ascc_search_tools tools = {&r->worker->loss_scratch, r->worker->context->workers,
+                                     &r->worker->context->kernels, &message};
+    truth_at(r, r->first_frame + t, r->truth);
+    return ascc_loss_of(r->task, r->plan, &tools, r->state + t * r->numbers, r->truth, r->wall,
+                        r->normal, r->first_frame + t, 1.0 / (double)horizon, loss, gradient);
+}
+
+/* Gradients after a step become those before it. */
+static ascc_status step_back(rollout *r, size_t t, const ascc_step_trace *trace, float *arranged,
+                             float *gradient)
+{
+    ascc_rollout_worker *w = r->worker;
+    const size_t n = r->numbers;
+    const double dt = r->motion.time_step;
+    /* x' = x + dt v', v' = v* + dv: by_velocity is from here on of v', and of dv */
+    for (size_t k = 0; k < n; k++)
+        r->by_velocity[k] += dt * r->by_position[k];
+    ascc_arena_reset(&w->scratch);
+    const bool first = t == 0;
+    const bool places = r->task->position_gradients && !first;
+    memset(r->seen, 0, 3 * n * sizeof *r->seen); /* seen, place, velocity lie together */
+    const ascc_backward pass = {.step = w->step,
+                                .trace = trace,
+                                .transposed = r->transposed,
+                                .kernels = &w->kernels,
+                                .arena = &w->scratch,
+                                .position = r->state + t * n,
+                                .correction = r->by_velocity,
+                                .arranged = arranged,
+                                .bias = gradient,
+                                .velocity = first ? NULL : r->velocity,
+                                .seen = places ? r->seen : NULL,
+                                .place = places ? r->place : NULL};
+    const ascc_status status = ascc_backward_run(&pass);
+    const double carried = r->motion.advection == ASCC_ADVECT_NONE ? 0.0 : dt;
+    for (size_t k = 0; k < n; k++) {
+        r->by_velocity[k] += r->velocity[k] + carried * r->seen[k];
+        r->by_position[k] += r->seen[k] + r->place[k];
+    }
+    return status;
+}
+
+/* Steps with gradient, forwards. Returns how many could be computed. */
+static size_t go_forwards(rollout *r, ascc_rollout_result *result, size_t *kept_from)
+{
+    const size_t horizon = (size_t)r->task->horizon;
+    size_t kept = horizon;
+    for (size_t t = 0; t < horizon; t++) {
+        keep_state(r, t);
+        const bool kept_step = t == 0 || t >= horizon - kept;
+        const ascc_status status = step_into(r, kept_step ? t % r->worker->kept_count : 0);
+        if (t == 0)
+            kept = count_kept(r, horizon);
+        result->status = status == ASCC_ERROR_MEMORY ? status : result->status;
+        if (status != ASCC_OK)
+            return t;
+        result->steps++;
+    }
+    keep_state(r, horizon);
+    *kept_from = horizon - kept;
+    return horizon;
+}
+
+static void go_back(rollout *r, ascc_rollout_result *result, size_t kept_from, float *arranged,
+                    float *gradient)
+{
+    const size_t horizon = (size_t)r->task->horizon, n = r->numbers;
+    const ascc_network *network = &r->worker->step->network;
+    double unused = 0.0;
+    memset(arranged, 0, network->weight_count * sizeof *arranged);
+    memset(r->by_position, 0, n * sizeof *r->by_position);
+    memset(r->by_velocity, 0, n * sizeof *r->by_velocity);
+    for (size_t t = horizon; t > 0 && result->status == ASCC_OK; t--) {
+        size_t arena = t - 1;
+        result->status = loss_at(r, t, horizon, &unused, r->by_position);
+        if (result->status == ASCC_OK && t - 1 < kept_from && t - 1 > 0) {
+            arena = horizon - 1; /* the last step's: no longer needed */
+            restore_state(r, t - 1);
+            result->status = step_into(r, arena);
+        } else if (result->status == ASCC_OK && t == 1 && kept_from > 0) {
+            restore_state(r, 0); /* its arena served other steps meanwhile */
+            result->status = step_into(r, 0);
+        }
+        if (result->status == ASCC_OK)
+            result->status = step_back(r, t - 1, &r->worker->trace[arena], arranged, gradient);
+    }
+    if (result->status == ASCC_OK)
+        ascc_backward_fold(network, r->worker->model, arranged, gradient);
+}
+
+ascc_rollout_result ascc_rollout_run(ascc_rollout_worker *worker, const ascc_transposed *transposed,
+                                     const ascc_rollout_task *task, float *arranged,
+                                     float *gradient)
+{
+    ascc_rollout_result result = {.status = ASCC_OK};
+    const ascc_plan *plan = &worker->model->plan;
+    const size_t d = (size_t)plan->dimension, horizon = (size_t)task->horizon;
+    rollout r = {.worker = worker, .transposed = transposed, .task = task, .plan = plan};
+    r.numbers = task->sequence->fluid_count * d;
+    r.walls = task->sequence->boundary_count * d;
+    r.motion = (ascc_motion){.time_step = worker->step->time_step, .advection = plan->advection};
+    for (size_t c = 0; c < d; c++)
+        for (size_t k = 0; k < d; k++)
+            r.motion.gravity[c] += task->placement.turn[c][k] * task->sequence->gravity[k];
+    result.status = take_memory(&r) ? open_particles(&r) : ASCC_ERROR_MEMORY;
+    if (result.status == ASCC_OK) {
+        size_t kept_from = 0;
+        prepare(&r, &result);
+        const size_t done = go_forwards(&r, &result, &kept_from);
+        result.failed_frame = r.first_frame + done;
+        for (size_t t = 1; t <= done && done == horizon && result.status == ASCC_OK; t++)
+            result.status = loss_at(&r, t, horizon, &result.loss, NULL);
+        result.skipped = done < horizon;
+        if (!result.skipped && result.status == ASCC_OK && task->backward && isfinite(result.loss))
+            go_back(&r, &result, kept_from, arranged, gradient);
+        if (result.status == ASCC_ERROR_RANGE) { /* a loss of particles beyond all bounds */
+            result.skipped = true;
+            result.status = ASCC_OK;
+        }
+    }
+    ascc_particles_destroy(&r.particles);
+    return result;
+}

@@ -1,0 +1,597 @@
+/* Iterations: draws rollouts, adds up their gradients in order, and moves the weights (METHOD section 8).
+ * SPDX-License-Identifier: MIT */
+#include "trainer.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+
+#define FAIL(status, ...) ascc_fail(&t->message, status, __VA_ARGS__)
+
+static bool alive(const ascc_trainer *t)
+{
+    return t && t->magic == ASCC_TRAINER_MAGIC;
+}
+
+/* ---- Creation ---- */
+
+static ascc_status read_options(ascc_trainer *t, const ascc_trainer_options *given)
+{
+    ascc_trainer_options *o = &t->options;
+    if (!ascc_read_struct(o, sizeof *o, given, sizeof *o))
+        return FAIL(ASCC_ERROR_ARGUMENT, "ascc_trainer_options.size is not understood");
+    if (o->stage_count < 1 || !o->stage)
+        return FAIL(ASCC_ERROR_ARGUMENT, "options: no stage");
+    for (int32_t i = 0; i < o->stage_count; i++) {
+        const ascc_training_stage *s = &o->stage[i];
+        if (s->horizon < 1 || s->horizon > 1000 || s->presteps < 0 || s->presteps > 10000 ||
+            !(s->learning_rate > 0.0) || !(s->learning_rate_end >= 0.0) ||
+            !isfinite(s->learning_rate + s->learning_rate_end) ||
+            s->end <= (i ? o->stage[i - 1].end : 0))
+            return FAIL(ASCC_ERROR_ARGUMENT,
+                        "options: stage %d: end must ascend, horizon be 1 to 1000, presteps 0 to "
+                        "10000, learning rates positive",
+                        (int)i);
+    }
+    const double numbers[] = {o->beta1, o->beta2, o->epsilon, o->clip, o->average, o->jitter,
+                              o->density_weight, o->wall_weight};
+    for (size_t i = 0; i < sizeof numbers / sizeof *numbers; i++)
+        if (!(numbers[i] >= 0.0 && isfinite(numbers[i])))
+            return FAIL(ASCC_ERROR_ARGUMENT, "options: a number is negative or not finite");
+    if (o->beta1 >= 1.0 || o->beta2 >= 1.0 || o->average >= 1.0 || o->thread_count < 0 ||
+        o->batch < 0 || o->batch > 65536 || !isfinite(o->neighbor_weight))
+        return FAIL(ASCC_ERROR_ARGUMENT, "options: beta1, beta2 and average must be below 1, "
+                                         "thread_count and batch not negative");
+    o->thread_count = o->thread_count ? o->thread_count : 1;
+    o->batch = o->batch ? o->batch : 8;
+    o->beta1 = o->beta1 > 0.0 ? o->beta1 : 0.9;
+    o->beta2 = o->beta2 > 0.0 ? o->beta2 : 0.999;
+    o->epsilon = o->epsilon > 0.0 ? o->epsilon : 1e-8;
+    o->clip = o->clip > 0.0 ? o->clip : 1.0;
+    o->neighbor_weight = o->neighbor_weight == 0.0 ? 1.0 : fmax(o->neighbor_weight, 0.0);
+    o->memory_limit = o->memory_limit ? o->memory_limit : (size_t)4 << 30;
+    t->batch = o->batch;
+    t->thread_count = o->thread_count < o->batch ? o->thread_count : o->batch;
+    t->stage_count = o->stage_count;
+    return ASCC_OK;
+}
+
+static void *take(ascc_trainer *t, size_t count, size_t element)
+{
+    void *memory = ascc_allocate(&t->allocator, count, element);
+    if (memory)
+        memset(memory, 0, count * element);
+    return memory;
+}
+
+static void give(ascc_trainer *t, void *memory, size_t count, size_t element)
+{
+    if (memory)
+        ascc_release(&t->allocator, memory, count, element);
+}
+
+/* The tensors' places: the model arranges them in the order of the file, each filled up to 16. */
+static ascc_status find_tensors(ascc_trainer *t)
+{
+    const ascc_plan *plan = &t->model->plan;
+    size_t offset = 0;
+    t->tensor_count = t->file.tensor_count;
+    t->tensor = take(t, t->tensor_count, sizeof *t->tensor);
+    if (!t->tensor)
+        return ASCC_ERROR_MEMORY;
+    for (size_t i = 0; i < t->tensor_count; i++) {
+        const ascc_tensor *tensor = &t->file.tensor[i];
+        const float *weights = t->model->weights + offset;
+        if (strcmp(tensor->type, "F32") != 0)
+            return FAIL(ASCC_ERROR_FORMAT, "tensor '%s' is %s; only F32 can be trained",
+                        tensor->name, tensor->type);
+        t->tensor[i] = (ascc_trained_tensor){
+            .first = t->parameter_count,
+            .count = tensor->count,
+            .offset = offset,
+            .damps = weights == plan->output.damping || weights == plan->output.walls.damping};
+        t->parameter_count += tensor->count;
+        offset += (tensor->count + 15) & ~(size_t)15;
+    }
+    return ASCC_OK;
+}
+
+static ascc_status take_arrays(ascc_trainer *t)
+{
+    const size_t batch = (size_t)t->batch, threads = (size_t)t->thread_count;
+    int32_t longest = 1;
+    t->stage = take(t, (size_t)t->stage_count, sizeof *t->stage);
+    if (!t->stage)
+        return ASCC_ERROR_MEMORY;
+    memcpy(t->stage, t->options.stage, (size_t)t->stage_count * sizeof *t->stage);
+    t->options.stage = t->stage;
+    for (int32_t i = 0; i < t->stage_count; i++)
+        longest = t->stage[i].horizon > longest ? t->stage[i].horizon : longest;
+    t->worker = take(t, threads, sizeof *t->worker);
+    for (size_t i = 0; t->worker && i < threads; i++)
+        if (!ascc_rollout_worker_open(&t->worker[i], t->context, t->model, longest))
+            return ASCC_ERROR_MEMORY;
+    if (!t->worker ||
+        !ascc_transposed_create(&t->transposed, &t->worker[0].step->network))
+        return ASCC_ERROR_MEMORY;
+    const size_t arranged = t->worker[0].step->network.weight_count;
+    t->arranged = take(t, threads * arranged, sizeof *t->arranged);
+    t->gradients = take(t, batch * t->model->weight_count, sizeof *t->gradients);
+    t->gradient = take(t, t->parameter_count, sizeof *t->gradient);
+    t->task = take(t, batch, sizeof *t->task);
+    t->result = take(t, batch, sizeof *t->result);
+    t->drawn = take(t, batch, sizeof *t->drawn);
+    t->weights = take(t, 4 * t->parameter_count, sizeof *t->weights);
+    if (!t->arranged || !t->gradients || !t->gradient || !t->task || !t->result || !t->drawn ||
+        !t->weights)
+        return ASCC_ERROR_MEMORY;
+    t->average = t->weights + t->parameter_count;
+    t->moment1 = t->average + t->parameter_count;
+    t->moment2 = t->moment1 + t->parameter_count;
+    for (size_t i = 0; i < t->tensor_count; i++)
+        memcpy(t->weights + t->tensor[i].first, t->model->weights + t->tensor[i].offset,
+               t->tensor[i].count * sizeof *t->weights);
+    memcpy(t->average, t->weights, t->parameter_count * sizeof *t->average);
+    return ASCC_OK;
+}
+
+static ascc_status open_model(ascc_trainer *t, const void *model, size_t size)
+{
+    const ascc_context_options options = {.size = sizeof options, .thread_count = 1};
+    ascc_status status = ascc_context_create(&options, &t->context);
+    if (status == ASCC_OK)
+        status = ascc_workers_create(&t->allocator, t->thread_count, NULL, NULL, NULL, &t->workers);
+    if (status != ASCC_OK)
+        return status;
+    status = ascc_model_load_memory(t->context, model, size, &t->model);
+    if (status != ASCC_OK) {
+        char text[ASCC_MESSAGE_CAPACITY];
+        ascc_context_message(t->context, text, sizeof text);
+        return FAIL(status, "%s", text);
+    }
+    t->byte_count = size;
+    t->bytes = take(t, size, 1);
+    t->averaged_bytes = take(t, size, 1);
+    if (!t->bytes || !t->averaged_bytes)
+        return ASCC_ERROR_MEMORY;
+    memcpy(t->bytes, model, size);
+    memcpy(t->averaged_bytes, model, size);
+    status = ascc_safetensors_open(&t->allocator, t->bytes, size, &t->file, &t->message);
+    if (status == ASCC_OK)
+        status = ascc_safetensors_open(&t->allocator, t->averaged_bytes, size, &t->averaged_file,
+                                       &t->message);
+    if (status != ASCC_OK)
+        return status;
+    if (!ascc_safetensors_metadata(&t->file, "network"))
+        return FAIL(ASCC_ERROR_FORMAT,
+                    "model: only files of the format 'ascc.model' can be trained");
+    uint64_t length = 0;
+    for (int i = 7; i >= 0; i--)
+        length = length << 8 | t->bytes[i];
+    t->header_count = 8 + (size_t)length;
+    return find_tensors(t);
+}
+
+ascc_status ascc_trainer_create(const ascc_trainer_options *options, const void *model,
+                                size_t model_size, ascc_trainer **trainer)
+{
+    if (trainer)
+        *trainer = NULL;
+    if (!options || !model || !trainer)
+        return ASCC_ERROR_ARGUMENT;
+    const ascc_allocator allocator = ascc_allocator_default();
+    ascc_trainer *t = ascc_allocate(&allocator, 1, sizeof *t);
+    if (!t)
+        return ASCC_ERROR_MEMORY;
+    memset(t, 0, sizeof *t);
+    t->magic = ASCC_TRAINER_MAGIC;
+    t->allocator = allocator;
+    ascc_status status = read_options(t, options);
+    if (status == ASCC_OK)
+        status = open_model(t, model, model_size);
+    if (status == ASCC_OK)
+        status = take_arrays(t);
+    if (status == ASCC_ERROR_MEMORY)
+        ascc_fail(&t->message, status, "no memory for the trainer");
+    if (status != ASCC_OK) {
+        if (options->size >= sizeof *options && options->message && options->message_size)
+            snprintf(options->message, options->message_size, "%s", t->message.text);
+        ascc_trainer_destroy(&t);
+        return status;
+    }
+    *trainer = t;
+    return ASCC_OK;
+}
+
+void ascc_trainer_destroy(ascc_trainer **trainer)
+{
+    if (!trainer || !*trainer)
+        return;
+    ascc_trainer *t = *trainer;
+    *trainer = NULL;
+    const size_t batch = (size_t)t->batch, threads = (size_t)t->thread_count;
+    const size_t arranged = t->worker && t->worker[0].step
+                                ? t->worker[0].step->network.weight_count
+                                : 0;
+    if (t->transposed.block)
+        ascc_transposed_destroy(&t->transposed, &t->worker[0].step->network);
+    for (size_t i = 0; t->worker && i < threads; i++)
+        ascc_rollout_worker_close(&t->worker[i]);
+    for (size_t i = 0; i < t->sequence_count; i++)
+        ascc_sequence_destroy(&t->sequence[i], &t->allocator);
+    give(t, t->worker, threads, sizeof *t->worker);
+    give(t, t->stage, (size_t)t->stage_count, sizeof *t->stage);
+    give(t, t->sequence, t->sequence_capacity, sizeof *t->sequence);
+    give(t, t->arranged, threads * arranged, sizeof *t->arranged);
+    give(t, t->gradients, t->model ? batch * t->model->weight_count : 0, sizeof *t->gradients);
+    give(t, t->gradient, t->parameter_count, sizeof *t->gradient);
+    give(t, t->task, batch, sizeof *t->task);
+    give(t, t->result, batch, sizeof *t->result);
+    give(t, t->drawn, batch, sizeof *t->drawn);
+    give(t, t->weights, 4 * t->parameter_count, sizeof *t->weights);
+    give(t, t->tensor, t->tensor_count, sizeof *t->tensor);
+    if (t->file.tensor)
+        ascc_safetensors_close(&t->file);
+    if (t->averaged_file.tensor)
+        ascc_safetensors_close(&t->averaged_file);
+    give(t, t->bytes, t->byte_count, 1);
+    give(t, t->averaged_bytes, t->byte_count, 1);
+    ascc_model_destroy(&t->model);
+    if (t->workers)
+        ascc_workers_destroy(&t->workers);
+    ascc_context_destroy(&t->context);
+    t->magic = 0;
+    const ascc_allocator allocator = t->allocator;
+    ascc_release(&allocator, t, 1, sizeof *t);
+}
+
+const char *ascc_trainer_message(const ascc_trainer *t)
+{
+    return alive(t) ? t->message.text : "";
+}
+
+uint64_t ascc_trainer_iteration(const ascc_trainer *t)
+{
+    return alive(t) ? t->iteration : 0;
+}
+
+/* ---- Parameters ---- */
+
+size_t ascc_trainer_parameter_count(const ascc_trainer *t)
+{
+    return alive(t) ? t->parameter_count : 0;
+}
+
+ascc_status ascc_trainer_get_parameters(const ascc_trainer *t, float *values)
+{
+    if (!alive(t) || !values)
+        return ASCC_ERROR_ARGUMENT;
+    memcpy(values, t->weights, t->parameter_count * sizeof *values);
+    return ASCC_OK;
+}
+
+/* Stored whole, an antisymmetric kernel stays what it is. */
+static bool is_whole_output(const ascc_trainer *t, const ascc_trained_tensor *tensor)
+{
+    const ascc_output *output = &t->model->plan.output;
+    return output->kind == ASCC_OUTPUT_ANTISYMMETRIC && !output->half && !output->filter.bumps &&
+           output->weight == t->model->weights + tensor->offset;
+}
+
+void ascc_trainer_apply(ascc_trainer *t)
+{
+    for (size_t i = 0; i < t->tensor_count; i++)
+        memcpy(t->model->weights + t->tensor[i].offset, t->weights + t->tensor[i].first,
+               t->tensor[i].count * sizeof *t->weights);
+    if (t->model->plan.output.half)
+        ascc_plan_expand(&t->model->plan,
+                         t->model->weights + (t->model->plan.output.weight - t->model->weights));
+    for (int32_t i = 0; i < t->thread_count; i++)
+        ascc_network_arrange(&t->worker[i].step->network);
+    ascc_transposed_update(&t->transposed, &t->worker[0].step->network);
+}
+
+ascc_status ascc_trainer_set_parameters(ascc_trainer *t, const float *values)
+{
+    if (!alive(t) || !values)
+        return ASCC_ERROR_ARGUMENT;
+    for (size_t i = 0; i < t->tensor_count; i++)
+        for (size_t k = t->tensor[i].first; k < t->tensor[i].first + t->tensor[i].count; k++)
+            if (!isfinite(values[k]) || (t->tensor[i].damps && values[k] < 0.0f))
+                return FAIL(ASCC_ERROR_ARGUMENT,
+                            "tensor '%s': number %zu is not finite, or negative where it damps",
+                            t->file.tensor[i].name, k - t->tensor[i].first);
+    memcpy(t->weights, values, t->parameter_count * sizeof *values);
+    memcpy(t->average, values, t->parameter_count * sizeof *values);
+    ascc_trainer_apply(t);
+    return ASCC_OK;
+}
+
+/* ---- Gradients ---- */
+
+/* Gradient by parameter from one laid out as the model's weights, times a share. */
+static void add_gradient(ascc_trainer *t, const float *laid_out, float share, float *to)
+{
+    const ascc_output *output = &t->model->plan.output;
+    const float *base = t->model->weights;
+    for (size_t i = 0; i < t->tensor_count; i++) {
+        const ascc_trained_tensor *tensor = &t->tensor[i];
+        const float *from = laid_out + tensor->offset;
+        for (size_t k = 0; k < tensor->count; k++)
+            to[tensor->first + k] += share * from[k];
+        if (is_whole_output(t, tensor)) {
+            const size_t values = (size_t)output->inputs * (size_t)t->model->plan.dimension;
+            const size_t cells = tensor->count / values;
+            for (size_t k = 0; k < tensor->count; k++) {
+                const size_t mirror = (cells - 1 - k / values) * values + k % values;
+                to[tensor->first + k] += share * 0.5f * (-from[k] - from[mirror]);
+            }
+        }
+        if (!output->half || output->half != base + tensor->offset)
+            continue;
+        /* half [z][y][x] of the whole: what the upper half does, less what its mirror does */
+        const float *whole = laid_out + (output->weight - base);
+        const int32_t *full = output->filter.cells;
+        int32_t part[3] = {full[0], full[1], full[2]};
+        part[output->half_axis] /= 2;
+        const size_t values = (size_t)output->inputs * (size_t)t->model->plan.dimension;
+        float *half = to + tensor->first;
+        for (int32_t z = 0; z < part[2]; z++)
+            for (int32_t y = 0; y < part[1]; y++)
+                for (int32_t x = 0; x < part[0]; x++, half += values) {
+                    int32_t at[3] = {x, y, z};
+                    at[output->half_axis] += part[output->half_axis];
+                    const size_t cell = (size_t)((at[2] * full[1] + at[1]) * full[0] + at[0]);
+                    const size_t mirror = (size_t)(full[0] * full[1] * full[2]) - 1 - cell;
+                    for (size_t k = 0; k < values; k++)
+                        half[k] += share * (whole[cell * values + k] - whole[mirror * values + k]);
+                }
+    }
+}
+
+static ascc_rollout_task make_task(const ascc_trainer *t, size_t sequence)
+{
+    return (ascc_rollout_task){
+        .sequence = &t->sequence[sequence],
+        .placement = ascc_placement_none(),
+        .neighbor_weight = t->options.neighbor_weight,
+        .density_weight = t->options.density_weight,
+        .wall_weight = t->options.wall_weight,
+        .position_gradients = t->options.position_gradients != 0,
+        .backward = true,
+        .memory_limit = t->options.memory_limit / (size_t)t->thread_count,
+    };
+}
+
+static ascc_status rollout_failure(ascc_trainer *t, const ascc_rollout_task *task,
+                                   const ascc_rollout_result *result)
+{
+    if (result->status == ASCC_ERROR_MEMORY)
+        return FAIL(ASCC_ERROR_MEMORY, "no memory for a rollout of sequence %s",
+                    task->sequence->name);
+    return FAIL(result->status, "sequence %s, frame %zu: %s", task->sequence->name,
+                result->failed_frame, ascc_status_text(result->status));
+}
+
+ascc_status ascc_trainer_gradient(ascc_trainer *t, size_t sequence, size_t frame, int32_t presteps,
+                                  int32_t horizon, double *loss, float *gradient)
+{
+    if (!alive(t) || !loss)
+        return ASCC_ERROR_ARGUMENT;
+    if (sequence >= t->sequence_count || frame < 1 || presteps < 0 || horizon < 1 ||
+        (size_t)horizon > t->worker[0].kept_count ||
+        frame + (size_t)presteps + (size_t)horizon >= t->sequence[sequence].frame_count)
+        return FAIL(ASCC_ERROR_ARGUMENT,
+                    "no such sequence, or frame, presteps and horizon lie beyond it or the stages");
+    ascc_rollout_task task = make_task(t, sequence);
+    task.frame = frame;
+    task.presteps = presteps;
+    task.horizon = horizon;
+    task.backward = gradient != NULL;
+    memset(t->gradients, 0, t->model->weight_count * sizeof *t->gradients);
+    const ascc_rollout_result result =
+        ascc_rollout_run(&t->worker[0], &t->transposed, &task, t->arranged, t->gradients);
+    if (result.status != ASCC_OK)
+        return rollout_failure(t, &task, &result);
+    if (result.skipped)
+        return FAIL(ASCC_ERROR_RANGE, "sequence %s, frame %zu: the step could not be computed",
+                    task.sequence->name, result.failed_frame);
+    *loss = result.loss;
+    if (gradient) {
+        memset(gradient, 0, t->parameter_count * sizeof *gradient);
+        add_gradient(t, t->gradients, 1.0f, gradient);
+    }
+    return ASCC_OK;
+}
+
+/* ---- One iteration ---- */
+
+ascc_status ascc_trainer_add_sequence(ascc_trainer *t, const ascc_training_sequence *sequence)
+{
+    if (!alive(t) || !sequence)
+        return ASCC_ERROR_ARGUMENT;
+    ascc_training_sequence given;
+    if (!ascc_read_struct(&given, sizeof given, sequence, sizeof given))
+        return FAIL(ASCC_ERROR_ARGUMENT, "ascc_training_sequence.size is not understood");
+    void *memory = t->sequence;
+    if (!ascc_grow(&t->allocator, &memory, &t->sequence_capacity, t->sequence_count + 1,
+                   sizeof *t->sequence))
+        return FAIL(ASCC_ERROR_MEMORY, "no memory for a sequence");
+    t->sequence = memory;
+    ascc_arena_reset(&t->worker[0].loss_scratch);
+    const ascc_search_tools tools = {&t->worker[0].loss_scratch, t->context->workers,
+                                     &t->context->kernels, &t->message};
+    const ascc_status status = ascc_sequence_create(&t->sequence[t->sequence_count], &t->allocator,
+                                                    &t->model->plan, &given, &tools);
+    if (status == ASCC_OK)
+        t->sequence_count++;
+    return status;
+}
+
+static const ascc_training_stage *find_stage(const ascc_trainer *t, double *rate)
+{
+    int32_t i = 0;
+    while (i < t->stage_count - 1 && t->iteration >= t->stage[i].end)
+        i++;
+    const ascc_training_stage *s = &t->stage[i];
+    const double begin = i ? (double)t->stage[i - 1].end : 0.0;
+    const double at = fmin(((double)t->iteration - begin) / ((double)s->end - begin), 1.0);
+    *rate = s->learning_rate_end > 0.0
+                ? s->learning_rate * pow(s->learning_rate_end / s->learning_rate, at)
+                : s->learning_rate;
+    return s;
+}
+
+/* Frames that a rollout with this many steps can start from. */
+static size_t starts_of(const ascc_sequence *s, const ascc_training_stage *stage, int32_t presteps)
+{
+    const size_t steps = (size_t)presteps + (size_t)stage->horizon;
+    return s->frame_count > steps + 1 ? s->frame_count - 1 - steps : 0;
+}
+
+static ascc_status draw_task(ascc_trainer *t, const ascc_training_stage *stage, size_t b)
+{
+    ascc_random random = ascc_random_open(t->options.seed, t->iteration, b);
+    const double presteps = ascc_random_uniform(&random) * (stage->presteps + 1.0);
+    double sum = 0.0, edge = t->model->plan.spacing;
+    for (size_t i = 0; i < t->sequence_count; i++)
+        sum += starts_of(&t->sequence[i], stage, 0) ? t->sequence[i].share : 0.0;
+    if (sum == 0.0)
+        return FAIL(ASCC_ERROR_ARGUMENT, "no sequence is long enough for %d steps",
+                    (int)stage->horizon);
+    double at = ascc_random_uniform(&random) * sum;
+    size_t chosen = 0;
+    for (size_t i = 0; i < t->sequence_count; i++) {
+        if (!starts_of(&t->sequence[i], stage, 0))
+            continue;
+        chosen = i;
+        if (at < t->sequence[i].share)
+            break;
+        at -= t->sequence[i].share;
+    }
+    t->drawn[b] = chosen;
+    ascc_rollout_task *task = &t->task[b];
+    *task = make_task(t, chosen);
+    task->horizon = stage->horizon;
+    task->presteps = (int32_t)presteps;
+    while (!starts_of(task->sequence, stage, task->presteps))
+        task->presteps--;
+    task->frame = 1 + (size_t)(ascc_random_uniform(&random) *
+                               (double)starts_of(task->sequence, stage, task->presteps));
+    for (int32_t l = 1; l < t->model->plan.level_count; l++)
+        edge = fmax(edge, t->model->plan.level[l].voxel);
+    task->placement = ascc_placement_draw(&random, task->sequence, t->options.rotate != 0,
+                                          t->options.mirror != 0, edge);
+    task->jitter = t->options.jitter * t->model->plan.spacing;
+    task->random = random;
+    return ASCC_OK;
+}
+
+static void run_tasks(void *data, size_t begin, size_t end, int32_t slot)
+{
+    ascc_trainer *t = data;
+    const size_t weights = t->model->weight_count;
+    const size_t arranged = t->worker[0].step->network.weight_count;
+    for (size_t b = begin; b < end; b++)
+        t->result[b] = ascc_rollout_run(&t->worker[slot], &t->transposed, &t->task[b],
+                                        t->arranged + (size_t)slot * arranged,
+                                        t->gradients + b * weights);
+}
+
+/* One step of Adam on the clipped gradient; damping stays without negative numbers. */
+static void adam(ascc_trainer *t, double rate, double norm)
+{
+    const ascc_trainer_options *o = &t->options;
+    const double n = (double)t->iteration + 1.0;
+    const double scale = norm > o->clip ? o->clip / norm : 1.0;
+    const double correct1 = 1.0 - pow(o->beta1, n), correct2 = 1.0 - pow(o->beta2, n);
+    const double keep = fmin(o->average, n / (n + 10.0));
+    for (size_t i = 0; i < t->tensor_count; i++)
+        for (size_t k = t->tensor[i].first; k < t->tensor[i].first + t->tensor[i].count; k++) {
+            const double g = scale * (double)t->gradient[k];
+            const double m = o->beta1 * (double)t->moment1[k] + (1.0 - o->beta1) * g;
+            const double v = o->beta2 * (double)t->moment2[k] + (1.0 - o->beta2) * g * g;
+            const double step = rate * (m / correct1) / (sqrt(v / correct2) + o->epsilon);
+            double w = (double)t->weights[k] - step;
+            if (t->tensor[i].damps && w < 0.0)
+                w = 0.0;
+            t->moment1[k] = (float)m;
+            t->moment2[k] = (float)v;
+            t->weights[k] = (float)w;
+            t->average[k] = (float)(keep * (double)t->average[k] + (1.0 - keep) * w);
+        }
+}
+
+static double now(void)
+{
+    struct timespec t;
+    clock_gettime(CLOCK_MONOTONIC, &t);
+    return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
+}
+
+static ascc_status sum_up(ascc_trainer *t, ascc_training_report *report)
+{
+    int32_t counted = 0;
+    double square = 0.0;
+    for (int32_t b = 0; b < t->batch; b++) {
+        const ascc_rollout_result *r = &t->result[b];
+        report->steps += r->steps;
+        report->ended_early += r->ended_early;
+        report->skipped += r->skipped;
+        if (r->status != ASCC_OK)
+            return rollout_failure(t, &t->task[b], r);
+        if (!r->skipped && !isfinite(r->loss))
+            return FAIL(ASCC_ERROR_NOT_FINITE, "sequence %s, frame %zu: the loss is not finite",
+                        t->task[b].sequence->name, t->task[b].frame);
+        if (r->skipped)
+            continue;
+        report->loss += r->loss;
+        counted++;
+    }
+    memset(t->gradient, 0, t->parameter_count * sizeof *t->gradient);
+    for (int32_t b = 0; b < t->batch; b++)
+        if (!t->result[b].skipped)
+            add_gradient(t, t->gradients + (size_t)b * t->model->weight_count,
+                         1.0f / (float)counted, t->gradient);
+    report->loss /= counted ? counted : 1;
+    for (size_t k = 0; k < t->parameter_count; k++)
+        square += (double)t->gradient[k] * (double)t->gradient[k];
+    report->gradient_norm = sqrt(square);
+    if (!isfinite(square))
+        return FAIL(ASCC_ERROR_NOT_FINITE, "sequence %s, frame %zu and others: the gradient is not "
+                                           "finite",
+                    t->task[0].sequence->name, t->task[0].frame);
+    return ASCC_OK;
+}
+
+ascc_status ascc_trainer_iterate(ascc_trainer *t, ascc_training_report *report)
+{
+    ascc_training_report own = {0};
+    if (!alive(t) || !report || !ascc_write_struct(report, &own, sizeof own, sizeof own))
+        return ASCC_ERROR_ARGUMENT;
+    const double begin = now();
+    const ascc_training_stage *stage = find_stage(t, &own.learning_rate);
+    own.horizon = stage->horizon;
+    own.presteps = stage->presteps;
+    ascc_status status = ASCC_OK;
+    for (int32_t b = 0; b < t->batch && status == ASCC_OK; b++)
+        status = draw_task(t, stage, (size_t)b);
+    if (status != ASCC_OK)
+        return status;
+    memset(t->gradients, 0, (size_t)t->batch * t->model->weight_count * sizeof *t->gradients);
+    ascc_workers_run(t->workers, (size_t)t->batch, 1, run_tasks, t);
+    status = sum_up(t, &own);
+    if (status == ASCC_OK) {
+        if (own.skipped < t->batch) {
+            adam(t, own.learning_rate, own.gradient_norm);
+            ascc_trainer_apply(t);
+        }
+        t->iteration++;
+    }
+    own.iteration = t->iteration;
+    own.seconds = now() - begin;
+    (void)ascc_write_struct(report, &own, sizeof own, sizeof own);
+    return status;
+}

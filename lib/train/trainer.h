@@ -1,0 +1,54 @@
+/* The trainer's insides. SPDX-License-Identifier: MIT */
+#ifndef ASCC_TRAIN_TRAINER_H
+#define ASCC_TRAIN_TRAINER_H
+
+#include <ascc/train.h>
+
+#include "../plan.h"
+#include "rollout.h"
+
+#define ASCC_TRAINER_MAGIC 0x54435341u /* "ASCT" */
+
+/* Where a tensor of the file lies among the model's weights. */
+typedef struct ascc_trained_tensor {
+    size_t first, count; /* parameters */
+    size_t offset;       /* in the model's weights */
+    bool damps;          /* must not become negative */
+} ascc_trained_tensor;
+
+struct ascc_trainer {
+    uint32_t magic;
+    int32_t thread_count, batch, stage_count;
+    ascc_allocator allocator;
+    ascc_context *context; /* one thread: rollouts run side by side, each on its own */
+    ascc_workers *workers;
+    ascc_model *model; /* its weights are the ones being trained */
+    unsigned char *bytes, *averaged_bytes; /* the model file, filled in when asked for */
+    size_t byte_count, header_count; /* header_count: of the bytes that weights do not change */
+    ascc_safetensors file, averaged_file;
+    ascc_trained_tensor *tensor;
+    size_t tensor_count, parameter_count;
+    ascc_trainer_options options; /* defaults filled in */
+    ascc_training_stage *stage;
+    ascc_sequence *sequence;
+    size_t sequence_count, sequence_capacity;
+
+    ascc_transposed transposed;
+    ascc_rollout_worker *worker; /* [threads] */
+    float *arranged;             /* [threads][network weights] */
+    float *gradients;            /* [batch][model weights] */
+    float *gradient;             /* [parameters] */
+    ascc_rollout_task *task;     /* [batch] */
+    ascc_rollout_result *result; /* [batch] */
+    size_t *drawn;               /* [batch] sequence numbers */
+
+    uint64_t iteration;
+    /* [parameters] each, one block: */
+    float *weights, *average, *moment1, *moment2;
+    ascc_message message;
+};
+
+/* The model takes over t->weights. */
+void ascc_trainer_apply(ascc_trainer *t);
+
+#endif
