@@ -16,7 +16,7 @@ static void print_model(const char *path, const ascc_model *model, const ascc_mo
     printf("  dimension         %d\n", m->dimension);
     printf("  levels, layers    %d, %d\n", m->level_count, m->layer_count);
     printf("  parameters        %llu\n", (unsigned long long)m->parameter_count);
-    printf("  cost              about %.3g multiply-adds a particle and step\n",
+    printf("  cost              about %.0f multiply-adds a particle and step\n",
            ascc_cost(&model->plan, &counts));
     printf("  conserves         %s\n", m->conserves_angular_momentum ? "momentum, angular momentum"
                                        : m->conserves_momentum       ? "momentum"
