@@ -16,6 +16,7 @@ static const struct {
     {"generate", "make sequences with the reference solver", ascc_command_generate},
     {"lint", "check sequences for spikes, escapes and clumps", ascc_command_lint},
     {"eval", "measure a method on true sequences", ascc_command_eval},
+    {"train", "train a network over rollouts", ascc_command_train},
 };
 
 static void usage(FILE *out)

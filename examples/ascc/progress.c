@@ -1,6 +1,7 @@
 /* Draws the bar a few times a second. SPDX-License-Identifier: MIT */
 #include "progress.h"
 
+#include <math.h>
 #include <stdio.h>
 #include <time.h>
 #include <unistd.h>
@@ -17,21 +18,26 @@ static double now(void)
 static void draw(const ascc_progress *p, double time)
 {
     const double share = p->total ? (double)p->done / (double)p->total : 1.0;
-    const double spent = time - p->started;
-    const double left = share > 0.0 ? spent * (1.0 - share) / share : 0.0;
+    const double spent = time - p->started, done = (double)(p->done - p->before);
+    const double rate = spent > 0.0 ? done / spent : 0.0;
+    const double left = rate > 0.0 ? (double)(p->total - p->done) / rate : 0.0;
     char bar[WIDTH + 1];
     for (int i = 0; i < WIDTH; i++)
         bar[i] = i < (int)(share * WIDTH) ? '#' : '.';
     bar[WIDTH] = '\0';
-    fprintf(stderr, "\r%s [%s] %zu/%zu  %.1f/s  %d:%02d left \033[K", p->label, bar, p->done,
-            p->total, spent > 0.0 ? (double)p->done / spent : 0.0, (int)left / 60, (int)left % 60);
+    fprintf(stderr, "\r%s [%s] %zu/%zu  %.1f/s  ", p->label, bar, p->done, p->total, rate);
+    if (left < 3600.0)
+        fprintf(stderr, "%d:%02d left \033[K", (int)left / 60, (int)left % 60);
+    else
+        fprintf(stderr, "%d:%02d:%02d left \033[K", (int)(left / 3600.0), (int)(left / 60.0) % 60,
+                (int)fmod(left, 60.0));
     fflush(stderr);
 }
 
 void ascc_progress_start(ascc_progress *p, const char *label, size_t total)
 {
     p->label = label;
-    p->done = 0;
+    p->done = p->before = 0;
     p->total = total;
     p->started = p->drawn = now();
     p->visible = isatty(STDERR_FILENO) != 0;

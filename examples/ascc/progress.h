@@ -8,11 +8,12 @@
 typedef struct ascc_progress {
     const char *label;
     size_t done, total;
+    size_t before;         /* done in an earlier run: without influence on the rate */
     double started, drawn; /* s */
     bool visible;
 } ascc_progress;
 
-/* The label is kept, not copied. */
+/* The label is kept, not copied: its text may change while the bar is shown. */
 void ascc_progress_start(ascc_progress *progress, const char *label, size_t total);
 void ascc_progress_add(ascc_progress *progress, size_t count);
 /* Clears the line. */

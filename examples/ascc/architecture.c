@@ -1,0 +1,839 @@
+/* Writes model files of random weights.
+ * SPDX-License-Identifier: MIT
+ *
+ * A weight's size: a layer's value should be about 1 where what it reads is. A column of a convolution
+ * (bump k, harmonic m) sums over neighbours; with s what that sum is about, weights have the deviation
+ * 1 / (s sqrt(inputs columns)).
+ */
+#include "architecture.h"
+
+#include <math.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+const char *const ascc_architecture_kernels[2] = {"basis", "grid"};
+const char *const ascc_architecture_outputs[2] = {"plain", "antisymmetric"};
+const char *const ascc_architecture_projections[2] = {"none", "radial"};
+const char *const ascc_architecture_samplings[3] = {"centers", "corners", "farthest"};
+const char *const ascc_architecture_evaluates[2] = {"current", "advected"};
+
+static const double PI = 3.14159265358979323846;
+static const double FILL = 0.7; /* of the neighbours inside a lattice: fluids have surfaces */
+static const double COARSE_RADIUS = 2.25; /* voxels */
+static const double SCALE = 0.05;         /* of the output, spacings */
+enum { OUTPUT_BUMPS = 4 };
+
+ascc_architecture ascc_architecture_default(int32_t dimension, ascc_architecture_family kernel)
+{
+    const bool basis = kernel == ASCC_FAMILY_BASIS;
+    return (ascc_architecture){.dimension = dimension,
+                               .kernel = kernel,
+                               .gravity = {0.0, -9.81, 0.0},
+                               .rest_density = 1000.0,
+                               .channels = 16,
+                               .fine_layers = 3,
+                               .coarse_channels = {16, 16, 16},
+                               .coarse_layers = 1,
+                               .radius = 2.25,
+                               .wall_radius = 4.0,
+                               .bumps = 3,
+                               .order = 1,
+                               .wall_bumps = 5,
+                               .output = ASCC_OUTPUT_ANTISYMMETRIC,
+                               .radial = !basis,
+                               .damping = basis,
+                               .sampling = basis ? ASCC_SAMPLING_CORNERS : ASCC_SAMPLING_CENTERS,
+                               .advected = basis};
+}
+
+/* ---- Text and bytes that grow ------------------------------------------------------------------- */
+
+typedef struct bytes {
+    char *data;
+    size_t length, capacity;
+    bool failed;
+} bytes;
+
+static bool grow(bytes *b, size_t more)
+{
+    if (b->failed || b->length + more <= b->capacity)
+        return !b->failed;
+    const size_t capacity = 2 * (b->length + more);
+    char *data = realloc(b->data, capacity);
+    b->failed = !data;
+    if (b->failed)
+        return false;
+    b->data = data;
+    b->capacity = capacity;
+    return true;
+}
+
+static void put(bytes *b, const void *from, size_t size)
+{
+    if (!grow(b, size + 1))
+        return;
+    memcpy(b->data + b->length, from, size);
+    b->length += size;
+    b->data[b->length] = '\0';
+}
+
+static void add(bytes *b, const char *format, ...) ASCC_PRINTF(2, 3);
+static void add(bytes *b, const char *format, ...)
+{
+    char text[512];
+    va_list arguments;
+    va_start(arguments, format);
+    const int length = vsnprintf(text, sizeof text, format, arguments);
+    va_end(arguments);
+    b->failed = b->failed || length < 0 || length >= (int)sizeof text;
+    if (!b->failed)
+        put(b, text, (size_t)length);
+}
+
+/* With the escapes that a JSON text needs. */
+static void add_escaped(bytes *b, const char *text)
+{
+    for (; *text; text++) {
+        const unsigned char c = (unsigned char)*text;
+        if (c < 0x20)
+            add(b, "\\u%04x", c);
+        else if (c == '"' || c == '\\')
+            add(b, "\\%c", c);
+        else
+            put(b, text, 1);
+    }
+}
+
+/* ---- The file being written --------------------------------------------------------------------- */
+
+typedef struct writer {
+    const ascc_architecture *a;
+    bytes network, tensors, data;
+    bool layers; /* there is one already */
+    bool terms;  /* of the layer being written */
+} writer;
+
+/* splitmix64 */
+static uint64_t next_random(uint64_t *state)
+{
+    uint64_t z = *state += 0x9e3779b97f4a7c15u;
+    z = (z ^ z >> 30) * 0xbf58476d1ce4e5b9u;
+    z = (z ^ z >> 27) * 0x94d049bb133111ebu;
+    return z ^ z >> 31;
+}
+
+/* Close to normal: a sum of twelve, which has the same bits everywhere. */
+static double normal(uint64_t *state)
+{
+    double sum = -6.0;
+    for (int i = 0; i < 12; i++)
+        sum += (double)(next_random(state) >> 11) * 0x1p-53;
+    return sum;
+}
+
+/* A tensor of shape [columns][rest ...], random from its own name, with the deviation of each column. */
+static void add_tensor(writer *w, const char *name, int rank, const size_t *shape, size_t columns,
+                       const double *deviation, bool positive)
+{
+    size_t count = 1;
+    const size_t begin = w->data.length;
+    uint64_t state = w->a->seed * 0xd1342543de82ef95u;
+    for (const char *c = name; *c; c++)
+        state = (state ^ (unsigned char)*c) * 0x100000001b3u;
+    add(&w->tensors, ",\"%s\":{\"dtype\":\"F32\",\"shape\":[", name);
+    for (int i = 0; i < rank; i++) {
+        add(&w->tensors, "%s%zu", i ? "," : "", shape[i]);
+        count *= shape[i];
+    }
+    for (size_t i = 0; i < count && grow(&w->data, 5); i++) {
+        const double random = deviation[i / (count / columns)] * normal(&state) + 0.0;
+        const float value = (float)(positive ? fabs(random) : random);
+        uint32_t bits;
+        memcpy(&bits, &value, sizeof bits);
+        const unsigned char little[4] = {(unsigned char)bits, (unsigned char)(bits >> 8),
+                                         (unsigned char)(bits >> 16), (unsigned char)(bits >> 24)};
+        put(&w->data, little, sizeof little);
+    }
+    add(&w->tensors, "],\"data_offsets\":[%zu,%zu]}", begin, w->data.length);
+}
+
+static void add_plain_tensor(writer *w, const char *name, int rank, const size_t *shape,
+                             double size)
+{
+    add_tensor(w, name, rank, shape, 1, &size, false);
+}
+
+static void add_bias(writer *w, const char *name, int32_t outputs, double size)
+{
+    const size_t shape[1] = {(size_t)outputs};
+    add(&w->network, ",\"bias\":\"%s.bias\"", name);
+    char text[80];
+    (void)snprintf(text, sizeof text, "%s.bias", name);
+    add_plain_tensor(w, text, 1, shape, size);
+}
+
+/* ---- How large the columns of a basis are -------------------------------------------------------- */
+
+/* Neighbours that a convolution sums over: a lattice around the point, or the plane of a wall. */
+typedef struct neighborhood {
+    int32_t dimension, bumps, order;
+    double radius;  /* spacings of the source's own lattice */
+    bool self;      /* the point is one of them */
+    bool wall;      /* a plane */
+    double members; /* sqrt(inputs columns) and what else divides */
+} neighborhood;
+
+static double bump(int32_t k, int32_t bumps, double rho)
+{
+    const double t = bumps * rho - k;
+    return fabs(t) < 1.0 ? (1.0 - t * t) * (1.0 - t * t) : 0.0;
+}
+
+static int32_t harmonics(int32_t dimension, int32_t order)
+{
+    return dimension == 2 ? 2 * order + 1 : (order + 1) * (order + 1);
+}
+
+/* Sum over neighbours of bump^power. */
+static double bump_sum(const neighborhood *n, int32_t k, int power)
+{
+    enum { SLICES = 400 };
+    double sum = 0.0;
+    const double away = n->wall ? 0.25 * n->radius : 0.0; /* of the plane */
+    for (int i = 0; i < SLICES; i++) {
+        const double r = n->radius * (i + 0.5) / SLICES, dr = n->radius / SLICES;
+        const bool flat = n->wall || n->dimension == 2; /* rings, else shells */
+        const double phi = bump(k, n->bumps, sqrt(r * r + away * away) / n->radius);
+        const double area = n->wall && n->dimension == 2 ? 2.0
+                            : flat                       ? 2.0 * PI * r
+                                                         : 4.0 * PI * r * r;
+        sum += area * dr * (power == 2 ? phi * phi : phi);
+    }
+    return (n->wall ? 2.5 : FILL) * sum; /* walls are sampled densely, or in layers */
+}
+
+static double basis_deviation(const neighborhood *n, size_t column)
+{
+    const int32_t count = harmonics(n->dimension, n->order), k = (int32_t)column / count;
+    const int32_t m = (int32_t)column % count;
+    double s;
+    if (m == 0)
+        s = bump_sum(n, k, 1) + (n->self && k == 0 ? 1.0 : 0.0);
+    else if (n->wall)
+        s = 0.5 * bump_sum(n, k, 1); /* walls lie on one side */
+    else
+        s = sqrt(bump_sum(n, k, 2) / n->dimension);
+    return 1.0 / (n->members * fmax(s, 1.0));
+}
+
+/* ---- Layers and terms ---------------------------------------------------------------------------- */
+
+static void begin_layer(writer *w, const char *name, const char *points, int32_t channels)
+{
+    add(&w->network, "%s{\"name\":\"%s\",\"points\":\"%s\",\"channels\":%d,\"terms\":[",
+        w->layers ? "]}," : "", name, points, channels);
+    w->layers = true;
+    w->terms = false;
+}
+
+static void begin_term(writer *w, const char *type, const char *source, bool relu)
+{
+    add(&w->network, "%s{\"type\":\"%s\",\"source\":\"%s\"%s", w->terms ? "," : "", type, source,
+        relu ? ",\"relu\":true" : "");
+    w->terms = true;
+}
+
+typedef struct convolution {
+    const char *name, *source;
+    bool relu, relative, wall;
+    bool self; /* source and layer are one set */
+    int32_t inputs, outputs, bumps;
+    double radius;     /* m */
+    double voxel;      /* m, spacing of the source's points */
+    double gain, bias; /* bias < 0: none */
+} convolution;
+
+static void add_convolution(writer *w, const convolution *c)
+{
+    char name[80];
+    const ascc_architecture *a = w->a;
+    const int32_t count = harmonics(a->dimension, a->order);
+    const size_t shape[4] = {(size_t)c->bumps, (size_t)count, (size_t)c->inputs,
+                             (size_t)c->outputs};
+    const neighborhood n = {.dimension = a->dimension,
+                            .bumps = c->bumps,
+                            .order = a->order,
+                            .radius = c->radius / c->voxel,
+                            .self = c->self,
+                            .wall = c->wall,
+                            .members = sqrt((double)c->inputs * c->bumps * count) / c->gain};
+    begin_term(w, "convolution", c->source, c->relu);
+    (void)snprintf(name, sizeof name, "%s.kernel", c->name);
+    add(&w->network, ",\"kernel\":\"%s\"", name);
+    double size[ASCC_MAX_BUMPS * 9];
+    for (size_t i = 0; i < shape[0] * shape[1]; i++)
+        size[i] = basis_deviation(&n, i);
+    add_tensor(w, name, 4, shape, shape[0] * shape[1], size, false);
+    if (c->bias >= 0.0)
+        add_bias(w, c->name, c->outputs, c->bias);
+    add(&w->network, ",\"radius\":%.9g,\"basis\":{\"bumps\":%d,\"order\":%d}%s}", c->radius,
+        c->bumps, a->order, c->relative ? ",\"relative\":true" : "");
+}
+
+static void add_dense(writer *w, const char *name, const char *source, bool relu, int32_t inputs,
+                      int32_t outputs)
+{
+    const size_t shape[2] = {(size_t)inputs, (size_t)outputs};
+    begin_term(w, "dense", source, relu);
+    add(&w->network, ",\"weight\":\"%s\"}", name);
+    add_plain_tensor(w, name, 2, shape, sqrt((relu ? 2.0 : 1.0) / inputs));
+}
+
+static void add_identity(writer *w, const char *source)
+{
+    begin_term(w, "identity", source, false);
+    add(&w->network, "}");
+}
+
+/* Between two sets of the BASIS family: a transfer, or a convolution where transfers cannot go. */
+typedef struct crossing {
+    const char *name, *source;
+    int32_t inputs, outputs;
+    double voxel; /* of the coarser of the two, m */
+    double source_voxel;
+    bool normalize;
+} crossing;
+
+static void add_crossing(writer *w, const crossing *c)
+{
+    const size_t shape[2] = {(size_t)c->inputs, (size_t)c->outputs};
+    char name[80];
+    if (w->a->sampling == ASCC_SAMPLING_FARTHEST) {
+        add_convolution(w, &(convolution){.name = c->name,
+                                          .source = c->source,
+                                          .relu = true,
+                                          .inputs = c->inputs,
+                                          .outputs = c->outputs,
+                                          .bumps = w->a->bumps,
+                                          .radius = COARSE_RADIUS * c->voxel,
+                                          .voxel = c->source_voxel,
+                                          .gain = 1.0,
+                                          .bias = -1.0});
+        return;
+    }
+    begin_term(w, "transfer", c->source, true);
+    (void)snprintf(name, sizeof name, "%s.weight", c->name);
+    add(&w->network, ",\"weight\":\"%s\"%s}", name, c->normalize ? ",\"normalize\":true" : "");
+    add_plain_tensor(w, name, 2, shape, sqrt(2.0 / c->inputs));
+}
+
+/* ---- The BASIS family ---------------------------------------------------------------------------- */
+
+static double voxel_of(const ascc_architecture *a, int32_t level)
+{
+    return a->spacing * (double)(1 << level);
+}
+
+static int32_t channels_of(const ascc_architecture *a, int32_t level)
+{
+    return level ? a->coarse_channels[level - 1] : a->channels;
+}
+
+static int32_t wall_channels(const ascc_architecture *a)
+{
+    return 1 + 2 * a->dimension; /* one, normal, motion */
+}
+
+static void points_of(int32_t level, const char *fine, char text[16])
+{
+    if (level)
+        (void)snprintf(text, 16, "level%d", level);
+    else
+        (void)snprintf(text, 16, "%s", fine);
+}
+
+/* Walls as a particle sees them, or as a level does. */
+static void add_wall_convolution(writer *w, const char *layer, int32_t level, int32_t outputs,
+                                 double gain)
+{
+    const ascc_architecture *a = w->a;
+    char name[64];
+    (void)snprintf(name, sizeof name, "%s.boundary", layer);
+    add_convolution(w, &(convolution){.name = name,
+                                      .source = "boundary",
+                                      .relative = level == 0,
+                                      .wall = true,
+                                      .inputs = wall_channels(a),
+                                      .outputs = outputs,
+                                      .bumps = level ? a->bumps : a->wall_bumps,
+                                      .radius = level ? COARSE_RADIUS * voxel_of(a, level)
+                                                      : a->wall_radius * a->spacing,
+                                      .voxel = a->spacing,
+                                      .gain = gain,
+                                      .bias = -1.0});
+}
+
+static void first_layer(writer *w)
+{
+    const ascc_architecture *a = w->a;
+    begin_layer(w, "l0", "fluid", a->channels);
+    add_convolution(w, &(convolution){.name = "l0.fluid",
+                                      .source = "fluid",
+                                      .relative = true,
+                                      .self = true,
+                                      .inputs = 1 + a->dimension,
+                                      .outputs = a->channels,
+                                      .bumps = a->bumps,
+                                      .radius = a->radius * a->spacing,
+                                      .voxel = a->spacing,
+                                      .gain = 1.0,
+                                      .bias = 0.1});
+    add_wall_convolution(w, "l0", 0, a->channels, 1.0);
+}
+
+/* A layer that reads the one before it on the same set: convolution + dense + identity. */
+static void same_layer(writer *w, const char *name, const char *source, int32_t level)
+{
+    const ascc_architecture *a = w->a;
+    const int32_t channels = channels_of(a, level);
+    char points[16], part[64];
+    points_of(level, "fluid", points);
+    begin_layer(w, name, points, channels);
+    add_convolution(
+        w, &(convolution){.name = name,
+                          .source = source,
+                          .relu = true,
+                          .self = true,
+                          .inputs = channels,
+                          .outputs = channels,
+                          .bumps = a->bumps,
+                          .radius = (level ? COARSE_RADIUS : a->radius) * voxel_of(a, level),
+                          .voxel = voxel_of(a, level),
+                          .gain = 1.0,
+                          .bias = 0.0});
+    (void)snprintf(part, sizeof part, "%s.dense", name);
+    add_dense(w, part, source, true, channels, channels);
+    add_identity(w, source);
+}
+
+/* From `source`, one level finer, to layer d on `level` and those that follow there; `last` receives
+ * the name of the last. */
+static void go_down(writer *w, int32_t level, const char *source, char last[32])
+{
+    const ascc_architecture *a = w->a;
+    const int32_t channels = channels_of(a, level);
+    char points[16], name[32], part[64];
+    points_of(level, "fluid", points);
+    (void)snprintf(name, sizeof name, "d%d", level);
+    (void)snprintf(part, sizeof part, "%s.down", name);
+    begin_layer(w, name, points, channels);
+    add_crossing(w, &(crossing){.name = part,
+                                .source = source,
+                                .inputs = channels_of(a, level - 1),
+                                .outputs = channels,
+                                .voxel = voxel_of(a, level),
+                                .source_voxel = voxel_of(a, level - 1),
+                                .normalize = true});
+    add_wall_convolution(w, name, level, channels, 1.0);
+    for (int32_t k = 1; k <= a->coarse_layers; k++) {
+        char next[32];
+        (void)snprintf(next, sizeof next, "c%d_%d", level, k);
+        same_layer(w, next, name, level);
+        memcpy(name, next, sizeof name);
+    }
+    memcpy(last, name, sizeof name);
+}
+
+static void add_up(writer *w, const char *layer, int32_t level, const char *source)
+{
+    const ascc_architecture *a = w->a;
+    char part[64];
+    (void)snprintf(part, sizeof part, "%s.up", layer);
+    add_crossing(w, &(crossing){.name = part,
+                                .source = source,
+                                .inputs = channels_of(a, level + 1),
+                                .outputs = channels_of(a, level),
+                                .voxel = voxel_of(a, level + 1),
+                                .source_voxel = voxel_of(a, level + 1)});
+}
+
+/* From `source`, one level coarser, to layers u and v on `level`, beside `own`, the last on the way
+ * down. */
+static void go_up(writer *w, int32_t level, const char *source, const char *own, char last[32])
+{
+    const int32_t channels = channels_of(w->a, level);
+    char points[16], name[32], part[64];
+    points_of(level, "fluid", points);
+    (void)snprintf(name, sizeof name, "u%d", level);
+    (void)snprintf(part, sizeof part, "%s.dense", name);
+    begin_layer(w, name, points, channels);
+    add_up(w, name, level, source);
+    add_dense(w, part, own, true, channels, channels);
+    add_identity(w, own);
+    (void)snprintf(last, 32, "v%d", level);
+    same_layer(w, last, name, level);
+}
+
+/* All levels; `last` receives the name of the last layer on level 1. */
+static void coarse_layers(writer *w, char last[32])
+{
+    char own[ASCC_ARCHITECTURE_LEVELS + 1][32] = {"l0"};
+    const int32_t levels = w->a->levels;
+    for (int32_t level = 1; level <= levels; level++)
+        go_down(w, level, own[level - 1], own[level]);
+    memcpy(last, own[levels], 32);
+    for (int32_t level = levels - 1; level >= 1; level--) {
+        char source[32];
+        memcpy(source, last, sizeof source);
+        go_up(w, level, source, own[level], last);
+    }
+}
+
+static void end_plain(writer *w)
+{
+    add(&w->network, "]}],\"output\":{\"type\":\"plain\",\"source\":\"correction\",\"scale\":%.9g}",
+        SCALE * w->a->spacing);
+}
+
+/* The last value is the correction itself. */
+static void plain_output(writer *w, const char *last)
+{
+    const ascc_architecture *a = w->a;
+    begin_layer(w, "correction", "fluid", a->dimension);
+    add_convolution(w, &(convolution){.name = "correction.fluid",
+                                      .source = last,
+                                      .relu = true,
+                                      .self = true,
+                                      .inputs = a->channels,
+                                      .outputs = a->dimension,
+                                      .bumps = a->bumps,
+                                      .radius = a->radius * a->spacing,
+                                      .voxel = a->spacing,
+                                      .gain = 0.1,
+                                      .bias = 0.0});
+    add_wall_convolution(w, "correction", 0, a->dimension, 0.1);
+    end_plain(w);
+}
+
+static void output_kernels(writer *w, const char *prefix, int32_t bumps)
+{
+    const size_t shape[2] = {(size_t)bumps, (size_t)w->a->channels};
+    const double strength = 0.02, damping = 0.05;
+    char name[64];
+    (void)snprintf(name, sizeof name, "%s.kernel", prefix);
+    add(&w->network, "\"kernel\":\"%s\"", name);
+    add_tensor(w, name, 2, shape, 1, &strength, false);
+    if (!w->a->damping)
+        return;
+    (void)snprintf(name, sizeof name, "%s.damping", prefix);
+    add(&w->network, ",\"damping\":\"%s\"", name);
+    add_tensor(w, name, 2, shape, 1, &damping, true);
+}
+
+static void central_output(writer *w, const char *last)
+{
+    const ascc_architecture *a = w->a;
+    add(&w->network,
+        "]}],\"output\":{\"type\":\"antisymmetric\",\"source\":\"%s\",\"relu\":true,\"scale\":%.9g,"
+        "\"radius\":%.9g,\"basis\":{\"bumps\":%d},",
+        last, SCALE * a->spacing, a->radius * a->spacing, OUTPUT_BUMPS);
+    output_kernels(w, "output", OUTPUT_BUMPS);
+    add(&w->network, ",\"walls\":{\"radius\":%.9g,\"basis\":{\"bumps\":%d},",
+        a->wall_radius * a->spacing, a->wall_bumps);
+    output_kernels(w, "output.walls", a->wall_bumps);
+    add(&w->network, "}%s}", a->advected ? ",\"direction\":\"current\"" : "");
+}
+
+static void basis_network(writer *w)
+{
+    const ascc_architecture *a = w->a;
+    char coarse[32], last[32] = "l0";
+    add(&w->network, ",\"features\":{\"fluid\":[\"one\",\"motion\"],"
+                     "\"boundary\":[\"one\",\"normal\",\"motion\"]},\"layers\":[");
+    first_layer(w);
+    if (a->levels)
+        coarse_layers(w, coarse);
+    for (int32_t k = 1; k < a->fine_layers; k++) {
+        char name[32];
+        (void)snprintf(name, sizeof name, "l%d", k);
+        same_layer(w, name, last, 0);
+        if (k == 1 && a->levels)
+            add_up(w, name, 0, coarse);
+        memcpy(last, name, sizeof last);
+    }
+    if (a->output == ASCC_OUTPUT_PLAIN)
+        plain_output(w, last);
+    else
+        central_output(w, last);
+}
+
+/* ---- The GRID family ----------------------------------------------------------------------------- */
+
+typedef struct grid_term {
+    const char *name, *source;
+    bool relu;
+    int32_t column, inputs, outputs;
+    int32_t level; /* the coarser of source and layer */
+    double gain;
+} grid_term;
+
+/* A filter of the paper: cells along each axis, the ball mapped to the cube keeping volumes. */
+static void add_grid_convolution(writer *w, const grid_term *t)
+{
+    const ascc_architecture *a = w->a;
+    const bool flat = a->dimension == 2;
+    const size_t cells = flat ? 8 : 4, depth = flat ? 1 : 4;
+    const size_t shape[5] = {depth, cells, cells, (size_t)t->inputs, (size_t)t->outputs};
+    const double r = a->radius, count = FILL * (flat ? PI * r * r : 4.0 / 3.0 * PI * r * r * r);
+    const double window = flat ? 1.0 / 4.0 : 16.0 / 105.0; /* mean of poly6 over the ball */
+    const double seen = 1.0 + count * window;              /* neighbours by window, itself one */
+    char name[80];
+    begin_term(w, "convolution", t->source, t->relu);
+    (void)snprintf(name, sizeof name, "%s.kernel", t->name);
+    add_plain_tensor(w, name, 5, shape,
+                     t->gain * sqrt((double)(depth * cells * cells) / t->inputs) / seen);
+    add(&w->network, ",\"column\":%d,\"kernel\":\"%s\"", t->column, name);
+    add_bias(w, t->name, t->outputs, t->relu ? 0.0 : 0.1);
+    add(&w->network, ",\"radius\":%.9g,\"window\":\"poly6\",\"mapping\":\"volume\"}",
+        r * voxel_of(a, t->level));
+}
+
+static void add_grid_dense(writer *w, const char *name, const char *source, int32_t column,
+                           int32_t inputs, int32_t outputs)
+{
+    const size_t shape[2] = {(size_t)inputs, (size_t)outputs};
+    begin_term(w, "dense", source, false);
+    add(&w->network, ",\"column\":%d,\"weight\":\"%s\"}", column, name);
+    add_plain_tensor(w, name, 2, shape, sqrt(1.0 / inputs));
+}
+
+/* Side by side: what the fluid around, the walls around and the point itself say. */
+static void grid_first_layer(writer *w)
+{
+    const ascc_architecture *a = w->a;
+    const int32_t inputs = 1 + a->dimension, part = a->channels / 4;
+    begin_layer(w, "l0", "all", a->channels);
+    add_grid_convolution(w, &(grid_term){.name = "l0.fluid",
+                                         .source = "fluid",
+                                         .inputs = inputs,
+                                         .outputs = a->channels - 2 * part,
+                                         .gain = 1.0});
+    add_grid_convolution(w, &(grid_term){.name = "l0.boundary",
+                                         .source = "boundary",
+                                         .column = a->channels - 2 * part,
+                                         .inputs = inputs,
+                                         .outputs = part,
+                                         .gain = 1.0});
+    add_grid_dense(w, "l0.fluid.dense", "fluid", a->channels - part, inputs, part);
+    add_grid_dense(w, "l0.boundary.dense", "boundary", a->channels - part, inputs, part);
+}
+
+static void grid_name(char name[32], int32_t layer, int32_t branch)
+{
+    if (layer)
+        (void)snprintf(name, 32, "l%d_%d", layer, branch);
+    else
+        (void)snprintf(name, 32, "l0");
+}
+
+/* A branch of a layer sees all branches of the layer before; the first layer has but one. */
+static void grid_branch(writer *w, int32_t layer, int32_t branch)
+{
+    const ascc_architecture *a = w->a;
+    const int32_t sources = layer > 1 ? a->levels + 1 : 1, outputs = channels_of(a, branch);
+    char name[32], source[32], points[16], part[64];
+    grid_name(name, layer, branch);
+    points_of(branch, "all", points);
+    begin_layer(w, name, points, outputs);
+    for (int32_t from = 0; from < sources; from++) {
+        grid_name(source, layer - 1, from);
+        (void)snprintf(part, sizeof part, "%s.%d", name, from);
+        add_grid_convolution(w, &(grid_term){.name = part,
+                                             .source = source,
+                                             .relu = true,
+                                             .inputs = channels_of(a, from),
+                                             .outputs = outputs,
+                                             .level = from > branch ? from : branch,
+                                             .gain = 1.0 / sqrt(sources)});
+    }
+    if (branch >= sources)
+        return;
+    grid_name(source, layer - 1, branch);
+    (void)snprintf(part, sizeof part, "%s.dense", name);
+    add_dense(w, part, source, true, outputs, outputs);
+    add_identity(w, source);
+}
+
+static void grid_antisymmetric_output(writer *w, const char *last)
+{
+    const ascc_architecture *a = w->a;
+    const bool flat = a->dimension == 2;
+    const size_t cells = flat ? 8 : 6;
+    const size_t shape[5] = {flat ? 1 : cells, cells / 2, cells, (size_t)a->channels,
+                             (size_t)a->dimension};
+    add(&w->network,
+        "]}],\"output\":{\"type\":\"antisymmetric\",\"source\":\"%s\",\"relu\":true,\"scale\":%.9g,"
+        "\"kernel\":\"output.kernel\",\"stored\":\"half\",\"half_axis\":\"y\",\"radius\":%.9g,"
+        "\"window\":\"peak\",\"mapping\":\"volume\",\"projection\":\"%s\"}",
+        last, SCALE * a->spacing, a->radius * a->spacing,
+        ascc_architecture_projections[a->radial ? 1 : 0]);
+    add_plain_tensor(w, "output.kernel", 5, shape, 0.1);
+}
+
+static void grid_plain_output(writer *w, const char *last)
+{
+    begin_layer(w, "correction", "fluid", w->a->dimension);
+    add_grid_convolution(w, &(grid_term){.name = "correction",
+                                         .source = last,
+                                         .relu = true,
+                                         .inputs = w->a->channels,
+                                         .outputs = w->a->dimension,
+                                         .gain = 0.1});
+    end_plain(w);
+}
+
+static void grid_network(writer *w)
+{
+    const ascc_architecture *a = w->a;
+    const int32_t last = a->fine_layers - 1;
+    char name[32];
+    add(&w->network, ",\"features\":{\"fluid\":[\"one\",\"velocity\"],"
+                     "\"boundary\":[\"one\",\"normal\"]},\"layers\":[");
+    grid_first_layer(w);
+    for (int32_t layer = 1; layer <= last; layer++)
+        for (int32_t branch = 0; branch <= (layer < last ? a->levels : 0); branch++)
+            grid_branch(w, layer, branch);
+    grid_name(name, last, 0);
+    if (a->output == ASCC_OUTPUT_PLAIN)
+        grid_plain_output(w, name);
+    else
+        grid_antisymmetric_output(w, name);
+}
+
+/* ---- The whole file ------------------------------------------------------------------------------ */
+
+static void add_levels(writer *w)
+{
+    static const char *const methods[3] = {"voxel_centers", "voxel_corners", "farthest"};
+    const ascc_architecture *a = w->a;
+    const bool farthest = a->sampling == ASCC_SAMPLING_FARTHEST;
+    add(&w->network, ",\"levels\":[");
+    for (int32_t level = 1; level <= a->levels; level++)
+        add(&w->network, "%s{\"%s\":%.9g}", level > 1 ? "," : "", farthest ? "ratio" : "voxel",
+            farthest ? pow(0.5, level * a->dimension) : voxel_of(a, level));
+    add(&w->network, "],\"sampling\":{\"method\":\"%s\"%s%s}", methods[a->sampling],
+        farthest ? "" : ",\"anchor\":\"world\"",
+        a->sampling == ASCC_SAMPLING_CORNERS ? ",\"hysteresis\":0" : "");
+}
+
+static void add_head(writer *w)
+{
+    const ascc_architecture *a = w->a;
+    bytes *b = &w->network;
+    add(b, "{\"name\":\"");
+    add_escaped(b, a->name);
+    add(b, "\",\"description\":\"");
+    add_escaped(b, a->description);
+    add(b, "\",\"dimension\":%d,\"time_step\":%.9g,\"gravity\":[%.9g,%.9g", a->dimension,
+        a->time_step, a->gravity[0], a->gravity[1]);
+    if (a->dimension == 3)
+        add(b, ",%.9g", a->gravity[2]);
+    add(b, "],\"particle_spacing\":%.9g,\"rest_density\":%.9g,\"evaluate\":\"%s\"", a->spacing,
+        a->rest_density, ascc_architecture_evaluates[a->advected ? 1 : 0]);
+    if (a->levels)
+        add_levels(w);
+}
+
+static unsigned char *finish(writer *w, size_t *size)
+{
+    static const char room[8] = {0};
+    bytes b = {NULL, 0, 0, false};
+    put(&b, room, sizeof room);
+    add(&b, "{\"__metadata__\":{\"format\":\"ascc.model\",\"version\":\"1\",\"network\":\"");
+    add_escaped(&b, w->network.data ? w->network.data : "");
+    add(&b, "\",\"initial_weights\":\"ascc train, seed %llu\"}", (unsigned long long)w->a->seed);
+    put(&b, w->tensors.data, w->tensors.length);
+    put(&b, "}", 1);
+    while (b.length % 8)
+        put(&b, " ", 1);
+    const uint64_t length = b.length - 8;
+    put(&b, w->data.data, w->data.length);
+    if (b.failed || w->network.failed || w->tensors.failed || w->data.failed) {
+        free(b.data);
+        return NULL;
+    }
+    for (int i = 0; i < 8; i++)
+        b.data[i] = (char)(unsigned char)(length >> 8 * i);
+    *size = b.length;
+    return (unsigned char *)b.data;
+}
+
+static const char *basis_fault(const ascc_architecture *a)
+{
+    if (a->bumps < 1 || a->bumps > ASCC_MAX_BUMPS || a->wall_bumps < 1 ||
+        a->wall_bumps > ASCC_MAX_BUMPS || a->order < 0 || a->order > ASCC_MAX_ORDER)
+        return "there are 1 to 8 bumps and wall_bumps, and orders 0 to 2";
+    if (a->radial)
+        return "projection is for kernel grid: a basis is central by itself";
+    if (a->damping && a->output == ASCC_OUTPUT_PLAIN)
+        return "damping needs output antisymmetric";
+    return NULL;
+}
+
+static const char *grid_fault(const ascc_architecture *a)
+{
+    if (a->damping)
+        return "damping needs kernel basis";
+    if (a->channels < 4)
+        return "kernel grid takes at least 4 channels";
+    if (a->radial && a->output == ASCC_OUTPUT_PLAIN)
+        return "projection needs output antisymmetric";
+    return NULL;
+}
+
+/* What is wrong with the numbers, NULL = nothing. */
+static const char *fault(const ascc_architecture *a)
+{
+    if (a->dimension != 2 && a->dimension != 3)
+        return "dimension must be 2 or 3";
+    if (!(a->spacing > 0.0) || !(a->time_step > 0.0) || !(a->rest_density > 0.0))
+        return "spacing, time_step and rest_density must be positive";
+    if (a->channels < 1 || a->channels > ASCC_MAX_CHANNELS || a->fine_layers < 2 ||
+        a->fine_layers > 16)
+        return "there are 1 to 1024 channels and 2 to 16 fine_layers";
+    if (a->levels < 0 || a->levels > ASCC_ARCHITECTURE_LEVELS || a->coarse_layers < 1 ||
+        a->coarse_layers > 16)
+        return "there are 0 to 3 levels and 1 to 16 coarse_layers";
+    for (int32_t level = 0; level < a->levels; level++)
+        if (a->coarse_channels[level] < 1 || a->coarse_channels[level] > ASCC_MAX_CHANNELS)
+            return "each level has 1 to 1024 coarse_channels";
+    if (!(a->radius > 0.0) || !(a->wall_radius > 0.0))
+        return "radius and wall_radius must be positive";
+    return a->kernel == ASCC_FAMILY_BASIS ? basis_fault(a) : grid_fault(a);
+}
+
+unsigned char *ascc_architecture_build(const ascc_architecture *a, size_t *size, char *error,
+                                       size_t capacity)
+{
+    writer w = {.a = a};
+    const char *wrong = fault(a);
+    unsigned char *file = NULL;
+    if (!wrong) {
+        add_head(&w);
+        if (a->kernel == ASCC_FAMILY_BASIS)
+            basis_network(&w);
+        else
+            grid_network(&w);
+        add(&w.network, "}");
+        file = finish(&w, size);
+        wrong = file ? NULL : "no memory";
+    }
+    if (wrong)
+        (void)snprintf(error, capacity, "%s", wrong);
+    free(w.network.data);
+    free(w.tensors.data);
+    free(w.data.data);
+    return file;
+}

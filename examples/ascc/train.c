@@ -1,0 +1,507 @@
+/* `ascc train`: trains a network as a config file says. SPDX-License-Identifier: MIT
+ *
+ *   iterate ─► validate, now and then ─► a row in the log ─► save, now and then
+ *
+ * What a run that goes on needs is in the checkpoint and, for the best model so far, in the log's rows up
+ * to the checkpoint's iteration.
+ */
+#include <errno.h>
+#include <fcntl.h>
+#include <inttypes.h>
+#include <math.h>
+#include <signal.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+#include <unistd.h>
+
+#include <ascc/train.h>
+
+#include "commands.h"
+#include "evaluate.h"
+#include "progress.h"
+#include "sequence.h"
+#include "train_config.h"
+#include "train_log.h"
+
+typedef struct training {
+    const char *path; /* of the config */
+    ascc_train_config config;
+    bool resume;
+    uint64_t end; /* iterations in all, when this run stops */
+    int32_t threads;
+    ascc_trainer *trainer;
+    ascc_train_log log;
+    ascc_truth *truth; /* of the valid sequences */
+    size_t truth_count;
+    ascc_progress progress;
+    char label[160];
+    double loss;  /* of late */
+    double speed; /* steps a second, of late */
+    double saved; /* when the last checkpoint was written, s */
+    char error[512];
+} training;
+
+static volatile sig_atomic_t interrupted;
+
+/* A second Ctrl-C ends the program at once. */
+static void on_interrupt(int number)
+{
+    (void)number;
+    interrupted = 1;
+}
+
+static bool fail(training *t, const char *what, const char *why)
+{
+    (void)snprintf(t->error, sizeof t->error, "%.200s: %.300s", what, why);
+    return false;
+}
+
+static double now(void)
+{
+    struct timespec time;
+    clock_gettime(CLOCK_MONOTONIC, &time);
+    return (double)time.tv_sec + 1e-9 * (double)time.tv_nsec;
+}
+
+static uint64_t schedule_end(const training *t)
+{
+    return t->config.stage[t->config.options.stage_count - 1].end;
+}
+
+/* ---- Files ---------------------------------------------------------------------------------------- */
+
+static bool write_all(int file, const unsigned char *bytes, size_t size)
+{
+    while (size > 0) {
+        const ssize_t n = write(file, bytes, size);
+        if (n < 0 && errno != EINTR)
+            return false;
+        bytes += n > 0 ? n : 0;
+        size -= n > 0 ? (size_t)n : 0;
+    }
+    return true;
+}
+
+/* Beside the path, synced, renamed: a file of that name is whole. */
+static bool replace_file(training *t, const char *path, const void *bytes, size_t size)
+{
+    char part[ASCC_TRAIN_PATH + 8];
+    (void)snprintf(part, sizeof part, "%s.part", path);
+    const int file = open(part, O_WRONLY | O_CREAT | O_TRUNC, 0666);
+    bool good = file >= 0 && write_all(file, bytes, size) && fsync(file) == 0;
+    const int why = errno;
+    good = (file < 0 || close(file) == 0) && good;
+    good = good && rename(part, path) == 0;
+    if (good)
+        return true;
+    (void)fail(t, path, strerror(why ? why : errno));
+    (void)unlink(part);
+    return false;
+}
+
+static unsigned char *read_whole(training *t, const char *path, size_t *size)
+{
+    FILE *file = fopen(path, "rb");
+    unsigned char *bytes = NULL;
+    *size = 0;
+    if (file && fseek(file, 0, SEEK_END) == 0 && ftell(file) > 0) {
+        *size = (size_t)ftell(file);
+        rewind(file);
+        bytes = malloc(*size);
+    }
+    if (!bytes || fread(bytes, 1, *size, file) != *size) {
+        (void)fail(t, path, errno ? strerror(errno) : "cannot be read");
+        free(bytes);
+        bytes = NULL;
+    }
+    if (file)
+        (void)fclose(file);
+    return bytes;
+}
+
+static bool write_model(training *t, const char *path)
+{
+    size_t size;
+    const void *bytes = ascc_trainer_model(t->trainer, t->config.options.average > 0.0, &size);
+    return bytes ? replace_file(t, path, bytes, size) : fail(t, path, "no memory");
+}
+
+/* ---- Sequences ------------------------------------------------------------------------------------ */
+
+static const char *last_name(const char *path)
+{
+    const char *slash = strrchr(path, '/');
+    return slash ? slash + 1 : path;
+}
+
+/* Rows of `row` values: each so many of `frames` move to the front. */
+static void thin(void *rows, size_t row_size, size_t frames, size_t every)
+{
+    unsigned char *bytes = rows;
+    for (size_t f = 1; f * every < frames; f++)
+        memmove(bytes + f * row_size, bytes + f * every * row_size, row_size);
+}
+
+static size_t thinned(size_t frames, size_t every)
+{
+    return frames ? (frames - 1) / every + 1 : 0;
+}
+
+static bool add_sequence(training *t, const ascc_train_source *source)
+{
+    ascc_sequence s;
+    char why[256];
+    const size_t every = (size_t)source->every;
+    if (!ascc_sequence_read(source->path, &s, why, sizeof why))
+        return fail(t, "train", why);
+    thin(s.position, s.count * (size_t)s.dimension * sizeof *s.position, s.frames, every);
+    const ascc_training_sequence sequence = {.size = sizeof sequence,
+                                             .name = last_name(source->path),
+                                             .frame_count = thinned(s.frames, every),
+                                             .fluid_count = s.count,
+                                             .boundary_count = s.walls,
+                                             .position = s.position,
+                                             .boundary_position = s.wall,
+                                             .boundary_normal = s.normal,
+                                             .time_step = s.time_step * source->every,
+                                             .gravity = {s.gravity[0], s.gravity[1], s.gravity[2]},
+                                             .share = source->share};
+    const ascc_status status = ascc_trainer_add_sequence(t->trainer, &sequence);
+    ascc_sequence_free(&s);
+    return status == ASCC_OK || fail(t, source->path, ascc_trainer_message(t->trainer));
+}
+
+static bool add_sequences(training *t)
+{
+    for (size_t i = 0; i < t->config.train.count; i++)
+        if (!add_sequence(t, &t->config.train.source[i]))
+            return false;
+    return true;
+}
+
+static bool load_truths(training *t)
+{
+    const ascc_train_sources *valid = &t->config.valid;
+    t->truth = calloc(valid->count + 1, sizeof *t->truth);
+    if (!t->truth)
+        return fail(t, "valid", "no memory");
+    for (size_t i = 0; i < valid->count; i++, t->truth_count++) {
+        ascc_truth *truth = &t->truth[i];
+        const size_t every = (size_t)valid->source[i].every;
+        ascc_method_error why = {""};
+        if (!ascc_truth_load(valid->source[i].path, t->threads, truth, &why))
+            return fail(t, "valid", why.text);
+        const size_t row =
+            truth->scene.fluid_count * (size_t)truth->scene.dimension * sizeof(double);
+        const bool moving = truth->velocity_frames == truth->frames;
+        thin(truth->position, row, truth->frames, every);
+        if (moving)
+            thin(truth->velocity, row, truth->velocity_frames, every);
+        truth->frames = thinned(truth->frames, every);
+        truth->velocity_frames = moving ? truth->frames : 1;
+        truth->scene.time_step *= (double)every;
+    }
+    return true;
+}
+
+/* ---- Validation ----------------------------------------------------------------------------------- */
+
+static double figure(const ascc_report_run *run, const char *name)
+{
+    for (size_t i = 0; i < run->count; i++)
+        if (strcmp(run->figure[i].name, name) == 0)
+            return run->figure[i].value;
+    return NAN;
+}
+
+static bool measure_errors(training *t, const ascc_truth *truth, ascc_validation *v,
+                           ascc_method_error *why)
+{
+    ascc_report_run run = {.sequence = "validation"};
+    const ascc_evaluate_options options = {.has_frames = true,
+                                           .no_rollout = true,
+                                           .first = t->config.validate_starts,
+                                           .end = -1,
+                                           .step = t->config.validate_starts,
+                                           .velocity = ASCC_VELOCITY_DIFFERENCE};
+    if (!ascc_evaluate(&options, &ascc_method_model, t->config.latest, truth, &run, why))
+        return false;
+    v->error[0] += figure(&run, "err_n1_difference") / (double)t->truth_count;
+    v->error[1] += figure(&run, "err_n2_difference") / (double)t->truth_count;
+    return true;
+}
+
+static bool measure_rollout(training *t, const ascc_truth *truth, ascc_validation *v,
+                            ascc_method_error *why)
+{
+    ascc_report_run run = {.sequence = "rollout"};
+    /* No start frames: the rollout alone. */
+    const ascc_evaluate_options options = {
+        .has_frames = true, .first = 1, .end = 1, .step = 1, .velocity = ASCC_VELOCITY_DIFFERENCE};
+    const size_t wanted = (size_t)t->config.validate_frames + 1;
+    ascc_truth part = *truth;
+    part.frames = truth->frames < wanted ? truth->frames : wanted;
+    if (part.velocity_frames > part.frames)
+        part.velocity_frames = part.frames;
+    if (!ascc_evaluate(&options, &ascc_method_model, t->config.latest, &part, &run, why))
+        return false;
+    const double last = figure(&run, "last_frame");
+    const double lost = figure(&run, "escaped_max") + figure(&run, "non_finite_max");
+    v->last_frame = fmin(v->last_frame, last);
+    v->escaped = fmax(v->escaped, lost);
+    v->density_error = fmax(v->density_error, figure(&run, "density_max_error"));
+    v->stable = v->stable && last == (double)(part.frames - 1) && lost == 0.0;
+    return true;
+}
+
+/* Measures the latest model, and keeps it if it is the best so far. */
+static bool validate(training *t, ascc_validation *v)
+{
+    ascc_method_error why = {""};
+    bool good = write_model(t, t->config.latest);
+    const size_t rollouts = (size_t)t->config.validate_rollouts;
+    *v = (ascc_validation){.measured = true, .last_frame = INFINITY, .stable = true};
+    for (size_t i = 0; i < t->truth_count && good; i++) {
+        good = measure_errors(t, &t->truth[i], v, &why) &&
+               (i >= rollouts || !t->config.validate_frames ||
+                measure_rollout(t, &t->truth[i], v, &why));
+        if (!good)
+            (void)fail(t, "validation", why.text);
+    }
+    return good && (!ascc_validation_better(v, &t->log.best) || write_model(t, t->config.output));
+}
+
+/* ---- One iteration after another ------------------------------------------------------------------ */
+
+static int32_t stage_of(const training *t, uint64_t iteration)
+{
+    int32_t stage = 0;
+    while (stage + 1 < t->config.options.stage_count && iteration > t->config.stage[stage].end)
+        stage++;
+    return stage + 1;
+}
+
+/* Checkpoint, latest model and, while none is the best, that as the output. */
+static bool save(training *t)
+{
+    const ascc_train_config *c = &t->config;
+    t->saved = now();
+    if (ascc_trainer_save(t->trainer, c->checkpoint) != ASCC_OK) {
+        (void)snprintf(t->error, sizeof t->error, "%.200s: %.200s; %s", c->checkpoint,
+                       ascc_trainer_message(t->trainer),
+                       access(c->checkpoint, F_OK) == 0 ? "the checkpoint from before is whole"
+                                                        : "there is no checkpoint yet");
+        return false;
+    }
+    return write_model(t, c->latest) && (t->log.best.measured || write_model(t, c->output));
+}
+
+static void show(training *t, const ascc_training_report *report)
+{
+    const ascc_validation *v = &t->log.last;
+    const double share = t->loss > 0.0 ? 0.05 : 1.0;
+    const double speed = report->seconds > 0.0 ? report->steps / report->seconds : 0.0;
+    t->loss += share * (report->loss - t->loss);
+    t->speed += share * (speed - t->speed);
+    int length = snprintf(t->label, sizeof t->label, "loss %.4f", t->loss);
+    if (v->measured)
+        length +=
+            snprintf(t->label + length, sizeof t->label - (size_t)length, "  errors %.2f/%.2f mm%s",
+                     1e3 * v->error[0], 1e3 * v->error[1], v->stable ? "" : " unstable");
+    (void)snprintf(t->label + length, sizeof t->label - (size_t)length, "  %.1f steps/s", t->speed);
+    ascc_progress_add(&t->progress, 1);
+}
+
+static bool iterate(training *t)
+{
+    ascc_training_report report = {.size = sizeof report};
+    ascc_validation v = {.measured = false};
+    if (ascc_trainer_iterate(t->trainer, &report) != ASCC_OK) {
+        (void)snprintf(t->error, sizeof t->error, "iteration %" PRIu64 ": %.400s",
+                       ascc_trainer_iteration(t->trainer) + 1, ascc_trainer_message(t->trainer));
+        return false;
+    }
+    const bool due =
+        report.iteration % t->config.validate_every == 0 || report.iteration == schedule_end(t);
+    if (t->truth_count && due && !validate(t, &v))
+        return false;
+    if (!ascc_train_log_add(&t->log, stage_of(t, report.iteration), &report, &v))
+        return fail(t, t->config.log, strerror(errno));
+    show(t, &report);
+    return now() - t->saved < t->config.checkpoint_seconds || save(t);
+}
+
+/* Whatever ends the run, the weights that are there are good ones: they are saved. */
+static bool run(training *t)
+{
+    const struct sigaction catch = {.sa_handler = on_interrupt, .sa_flags = (int)SA_RESETHAND};
+    const struct sigaction ignore = {.sa_handler = SIG_IGN};
+    (void)sigaction(SIGINT, &catch, NULL);
+    (void)sigaction(SIGTERM, &catch, NULL);
+    (void)sigaction(SIGXFSZ, &ignore, NULL); /* a file too large is an error like a full disk */
+    t->saved = now();
+    (void)snprintf(t->label, sizeof t->label, "training");
+    ascc_progress_start(&t->progress, t->label, (size_t)t->end);
+    t->progress.done = t->progress.before = (size_t)ascc_trainer_iteration(t->trainer);
+    bool good = true;
+    while (good && !interrupted && ascc_trainer_iteration(t->trainer) < t->end)
+        good = iterate(t);
+    ascc_progress_end(&t->progress);
+    char first[sizeof t->error];
+    memcpy(first, t->error, sizeof first);
+    const bool saved = save(t);
+    if (!good) /* the first error is the one to tell */
+        memcpy(t->error, first, sizeof first);
+    if (!good && saved)
+        fprintf(stderr, "ascc train: %s and %s hold iteration %" PRIu64 "\n", t->config.checkpoint,
+                t->config.latest, ascc_trainer_iteration(t->trainer));
+    return saved && good;
+}
+
+/* ---- From config to trainer ----------------------------------------------------------------------- */
+
+static bool create_trainer(training *t)
+{
+    ascc_train_config *c = &t->config;
+    char why[256] = "";
+    size_t size;
+    unsigned char *bytes = c->model[0]
+                               ? read_whole(t, c->model, &size)
+                               : ascc_architecture_build(&c->architecture, &size, why, sizeof why);
+    if (!bytes)
+        return c->model[0] ? false : fail(t, "network", why);
+    c->options.thread_count = t->threads;
+    c->options.message = why;
+    c->options.message_size = sizeof why;
+    const ascc_status status = ascc_trainer_create(&c->options, bytes, size, &t->trainer);
+    free(bytes);
+    if (status != ASCC_OK)
+        return fail(t, c->model[0] ? c->model : "network", why[0] ? why : ascc_status_text(status));
+    return true;
+}
+
+static bool load_checkpoint(training *t)
+{
+    const char *path = t->config.checkpoint;
+    const bool there = access(path, F_OK) == 0;
+    if (there && !t->resume)
+        return fail(t, path, "is there already: --resume goes on from it; move it to begin anew");
+    if (!there && t->resume)
+        fprintf(stderr, "ascc train: %s: not there yet, training begins\n", path);
+    if (there && ascc_trainer_load(t->trainer, path) != ASCC_OK)
+        return fail(t, path, ascc_trainer_message(t->trainer));
+    return true;
+}
+
+static bool open_all(training *t)
+{
+    char why[512];
+    if (!create_trainer(t) || !load_checkpoint(t) || !add_sequences(t) || !load_truths(t))
+        return false;
+    if (ascc_train_log_open(t->config.log, ascc_trainer_iteration(t->trainer), &t->log, why,
+                            sizeof why))
+        return true;
+    (void)snprintf(t->error, sizeof t->error, "%s", why);
+    return false;
+}
+
+static void close_all(training *t)
+{
+    for (size_t i = 0; i < t->truth_count; i++)
+        ascc_truth_free(&t->truth[i]);
+    free(t->truth);
+    ascc_train_log_close(&t->log);
+    ascc_trainer_destroy(&t->trainer);
+    ascc_train_config_free(&t->config);
+}
+
+static void print_result(const training *t)
+{
+    const ascc_train_config *c = &t->config;
+    const ascc_validation *best = &t->log.best;
+    const uint64_t done = ascc_trainer_iteration(t->trainer);
+    printf("%s: %" PRIu64 " iterations, %.0f s\n", c->output, done, t->log.seconds);
+    if (best->measured)
+        printf("  best on valid      errors %.4g and %.4g mm, %s\n", 1e3 * best->error[0],
+               1e3 * best->error[1], best->stable ? "rollouts hold" : "rollouts lose particles");
+    if (c->valid.count)
+        printf("  latest             %s\n", c->latest);
+    if (ascc_train_log_chart(c->log, c->chart, best->measured))
+        printf("  log, chart         %s, %s\n", c->log, c->chart);
+    else
+        printf("  log                %s; no chart: gnuplot is not installed, or failed\n", c->log);
+    if (done < schedule_end(t))
+        printf("stopped before %" PRIu64 " iterations; ascc train %s --resume goes on\n",
+               schedule_end(t), t->path);
+}
+
+/* ---- Arguments ------------------------------------------------------------------------------------ */
+
+static int usage(FILE *file)
+{
+    fputs("usage: ascc train CONFIG [--resume] [--iterations N] [--threads N]\n\n"
+          "Trains a network as the file CONFIG says (docs/training.md). Ctrl-C saves and stops.\n\n"
+          "  --resume        goes on from the checkpoint; the result is that of never having "
+          "stopped\n"
+          "  --iterations N  stops (to be resumed) after N iterations in all\n"
+          "  --threads N     threads to use (all); results do not depend on it\n",
+          file);
+    return file == stdout ? 0 : 2;
+}
+
+static bool read_count(const char *text, uint64_t most, uint64_t *value)
+{
+    char *end;
+    errno = 0;
+    *value = strtoull(text, &end, 10);
+    return *text >= '0' && *text <= '9' && !*end && !errno && *value >= 1 && *value <= most;
+}
+
+static bool read_arguments(training *t, int argc, char **argv)
+{
+    uint64_t threads = 0;
+    for (int i = 0; i < argc; i++) {
+        const bool value = i + 1 < argc;
+        if (strcmp(argv[i], "--resume") == 0) {
+            t->resume = true;
+        } else if (strcmp(argv[i], "--iterations") == 0 && value &&
+                   read_count(argv[i + 1], (uint64_t)1 << 40, &t->end)) {
+            i++;
+        } else if (strcmp(argv[i], "--threads") == 0 && value &&
+                   read_count(argv[i + 1], 1024, &threads)) {
+            i++;
+        } else if (argv[i][0] != '-' && !t->path) {
+            t->path = argv[i];
+        } else {
+            fprintf(stderr, "ascc train: %s: unknown, or not with this value\n", argv[i]);
+            return false;
+        }
+    }
+    const long processors = sysconf(_SC_NPROCESSORS_ONLN);
+    t->threads = threads ? (int32_t)threads : processors > 0 ? (int32_t)processors : 1;
+    return t->path != NULL;
+}
+
+int ascc_command_train(int argc, char **argv)
+{
+    static training t; /* large: paths */
+    if (argc == 1 && strcmp(argv[0], "--help") == 0)
+        return usage(stdout);
+    if (!read_arguments(&t, argc, argv))
+        return usage(stderr);
+    bool good = ascc_train_config_read(t.path, &t.config, t.error, sizeof t.error);
+    if (good && (t.end == 0 || t.end > schedule_end(&t)))
+        t.end = schedule_end(&t);
+    good = good && open_all(&t);
+    if (good) {
+        good = run(&t);
+        if (good)
+            print_result(&t);
+    }
+    if (t.error[0])
+        fprintf(stderr, "ascc train: %s\n", t.error);
+    close_all(&t);
+    return good ? 0 : 1;
+}
