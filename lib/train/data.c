@@ -87,7 +87,7 @@ static double square_between(const ascc_near *near, size_t i, size_t j)
     return square;
 }
 
-static ascc_status measure_fluid(ascc_sequence *s, const ascc_plan *plan, size_t frame,
+static ascc_status measure_fluid(ascc_kept_sequence *s, const ascc_plan *plan, size_t frame,
                                  const double *x, const ascc_search_tools *tools, histogram *dense)
 {
     ascc_near near;
@@ -112,7 +112,7 @@ static ascc_status measure_fluid(ascc_sequence *s, const ascc_plan *plan, size_t
     return status;
 }
 
-static ascc_status measure_walls(const ascc_sequence *s, const ascc_plan *plan, const double *x,
+static ascc_status measure_walls(const ascc_kept_sequence *s, const ascc_plan *plan, const double *x,
                                  const double *wall, const ascc_search_tools *tools,
                                  histogram *depth)
 {
@@ -138,7 +138,7 @@ static ascc_status measure_walls(const ascc_sequence *s, const ascc_plan *plan, 
     return status;
 }
 
-static ascc_status measure(ascc_sequence *s, const ascc_allocator *allocator, const ascc_plan *plan,
+static ascc_status measure(ascc_kept_sequence *s, const ascc_allocator *allocator, const ascc_plan *plan,
                            const ascc_search_tools *tools)
 {
     const size_t d = (size_t)s->dimension, n = s->fluid_count * d, w = s->boundary_count * d;
@@ -175,7 +175,7 @@ static ascc_status measure(ascc_sequence *s, const ascc_allocator *allocator, co
     return status;
 }
 
-ascc_status ascc_sequence_create(ascc_sequence *s, const ascc_allocator *allocator,
+ascc_status ascc_kept_sequence_create(ascc_kept_sequence *s, const ascc_allocator *allocator,
                                  const ascc_plan *plan, const ascc_training_sequence *given,
                                  const ascc_search_tools *tools)
 {
@@ -200,12 +200,12 @@ ascc_status ascc_sequence_create(ascc_sequence *s, const ascc_allocator *allocat
         status = measure(s, allocator, plan, tools);
     if (status != ASCC_OK) {
         ascc_fail(tools->message, status, "sequence %s: %s", s->name, ascc_status_text(status));
-        ascc_sequence_destroy(s, allocator);
+        ascc_kept_sequence_destroy(s, allocator);
     }
     return status;
 }
 
-void ascc_sequence_destroy(ascc_sequence *s, const ascc_allocator *allocator)
+void ascc_kept_sequence_destroy(ascc_kept_sequence *s, const ascc_allocator *allocator)
 {
     const size_t d = (size_t)s->dimension;
     if (s->position)
@@ -321,7 +321,7 @@ static void make_turn(double turn[3][3], const double axis[3], double cosine, do
         }
 }
 
-ascc_placement ascc_placement_draw(ascc_random *random, const ascc_sequence *s, bool rotate,
+ascc_placement ascc_placement_draw(ascc_random *random, const ascc_kept_sequence *s, bool rotate,
                                    bool mirror, double edge)
 {
     ascc_placement p = ascc_placement_none();

@@ -8,7 +8,7 @@
 #include "../model.h"
 #include "../neighbors.h"
 
-typedef struct ascc_sequence {
+typedef struct ascc_kept_sequence {
     char name[128];
     size_t frame_count, fluid_count, boundary_count;
     int32_t dimension, reserved;
@@ -18,13 +18,13 @@ typedef struct ascc_sequence {
     double near_mean;  /* over all frames */
     double dense;      /* rho_95 of docs/training.md */
     double wall_depth; /* s_05, m */
-} ascc_sequence;
+} ascc_kept_sequence;
 
 /* Copies and measures. tools: an arena that is reset. errors: ARGUMENT, MEMORY, MISMATCH, NOT_FINITE. */
-ascc_status ascc_sequence_create(ascc_sequence *sequence, const ascc_allocator *allocator,
+ascc_status ascc_kept_sequence_create(ascc_kept_sequence *sequence, const ascc_allocator *allocator,
                                  const ascc_plan *plan, const ascc_training_sequence *given,
                                  const ascc_search_tools *tools);
-void ascc_sequence_destroy(ascc_sequence *sequence, const ascc_allocator *allocator);
+void ascc_kept_sequence_destroy(ascc_kept_sequence *sequence, const ascc_allocator *allocator);
 
 /* A motion of the whole scene: x -> turn x + shift. */
 typedef struct ascc_placement {
@@ -46,7 +46,7 @@ double ascc_random_normal(ascc_random *random);
 
 /* A turn about gravity (without gravity: about any axis), a mirror in a plane along it, and a shift
  * within a cube of this edge. */
-ascc_placement ascc_placement_draw(ascc_random *random, const ascc_sequence *sequence, bool rotate,
+ascc_placement ascc_placement_draw(ascc_random *random, const ascc_kept_sequence *sequence, bool rotate,
                                    bool mirror, double edge);
 
 #endif

@@ -9,7 +9,7 @@
 static double distance_loss(const ascc_rollout_task *task, const ascc_plan *plan, const double *x,
                             const double *truth, size_t frame, double share, double *gradient)
 {
-    const ascc_sequence *s = task->sequence;
+    const ascc_kept_sequence *s = task->sequence;
     const size_t d = (size_t)s->dimension, n = s->fluid_count;
     const uint16_t *near = s->near + frame * n;
     double sum = 0.0, weights = 0.0, mean = 0.0;
@@ -46,7 +46,7 @@ static ascc_status density_loss(const ascc_rollout_task *task, const ascc_plan *
                                 const ascc_search_tools *tools, const double *x, double share,
                                 double *loss, double *gradient)
 {
-    const ascc_sequence *s = task->sequence;
+    const ascc_kept_sequence *s = task->sequence;
     const size_t d = (size_t)s->dimension, n = s->fluid_count;
     const double radius = 2.0 * plan->spacing, factor = task->density_weight / (double)n;
     ascc_near near;
@@ -80,7 +80,7 @@ static ascc_status wall_loss(const ascc_rollout_task *task, const ascc_plan *pla
                              const ascc_search_tools *tools, const double *x, const double *wall,
                              const double *normal, double share, double *loss, double *gradient)
 {
-    const ascc_sequence *s = task->sequence;
+    const ascc_kept_sequence *s = task->sequence;
     const size_t d = (size_t)s->dimension, n = s->fluid_count;
     const double factor = task->wall_weight / (double)n, h = plan->spacing;
     ascc_near near;

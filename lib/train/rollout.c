@@ -88,7 +88,7 @@ static bool take_memory(rollout *r)
 
 static void truth_at(const rollout *r, size_t frame, double *to)
 {
-    const ascc_sequence *s = r->task->sequence;
+    const ascc_kept_sequence *s = r->task->sequence;
     ascc_placement_apply(&r->task->placement, s->dimension, s->position + frame * r->numbers,
                          s->fluid_count, false, to);
 }
@@ -113,7 +113,7 @@ static void start_at(rollout *r, size_t frame, ascc_random *random)
 
 static ascc_status open_particles(rollout *r)
 {
-    const ascc_sequence *s = r->task->sequence;
+    const ascc_kept_sequence *s = r->task->sequence;
     const ascc_particles_options options = {.size = sizeof options,
                                             .dimension = s->dimension,
                                             .spacing = r->plan->spacing,

@@ -8,7 +8,7 @@
 
 /* What a rollout asks for. */
 typedef struct ascc_rollout_task {
-    const ascc_sequence *sequence;
+    const ascc_kept_sequence *sequence;
     size_t frame; /* where it starts, >= 1 */
     int32_t presteps, horizon;
     ascc_placement placement;

@@ -220,7 +220,7 @@ void ascc_trainer_destroy(ascc_trainer **trainer)
     for (size_t i = 0; t->worker && i < threads; i++)
         ascc_rollout_worker_close(&t->worker[i]);
     for (size_t i = 0; i < t->sequence_count; i++)
-        ascc_sequence_destroy(&t->sequence[i], &t->allocator);
+        ascc_kept_sequence_destroy(&t->sequence[i], &t->allocator);
     give(t, t->worker, threads, sizeof *t->worker);
     give(t, t->stage, (size_t)t->stage_count, sizeof *t->stage);
     give(t, t->sequence, t->sequence_capacity, sizeof *t->sequence);
@@ -423,7 +423,7 @@ ascc_status ascc_trainer_add_sequence(ascc_trainer *t, const ascc_training_seque
     ascc_arena_reset(&t->worker[0].loss_scratch);
     const ascc_search_tools tools = {&t->worker[0].loss_scratch, t->context->workers,
                                      &t->context->kernels, &t->message};
-    const ascc_status status = ascc_sequence_create(&t->sequence[t->sequence_count], &t->allocator,
+    const ascc_status status = ascc_kept_sequence_create(&t->sequence[t->sequence_count], &t->allocator,
                                                     &t->model->plan, &given, &tools);
     if (status == ASCC_OK)
         t->sequence_count++;
@@ -445,7 +445,7 @@ static const ascc_training_stage *find_stage(const ascc_trainer *t, double *rate
 }
 
 /* Frames that a rollout with this many steps can start from. */
-static size_t starts_of(const ascc_sequence *s, const ascc_training_stage *stage, int32_t presteps)
+static size_t starts_of(const ascc_kept_sequence *s, const ascc_training_stage *stage, int32_t presteps)
 {
     const size_t steps = (size_t)presteps + (size_t)stage->horizon;
     return s->frame_count > steps + 1 ? s->frame_count - 1 - steps : 0;

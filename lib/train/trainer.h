@@ -30,7 +30,7 @@ struct ascc_trainer {
     size_t tensor_count, parameter_count;
     ascc_trainer_options options; /* defaults filled in */
     ascc_training_stage *stage;
-    ascc_sequence *sequence;
+    ascc_kept_sequence *sequence;
     size_t sequence_count, sequence_capacity;
 
     ascc_transposed transposed;
