@@ -37,10 +37,10 @@ ascc_architecture ascc_architecture_default(int32_t dimension, ascc_architecture
                                .coarse_channels = {16, 16, 16},
                                .coarse_layers = 1,
                                .radius = 2.25,
-                               .wall_radius = 4.0,
+                               .wall_radius = 3.2,
                                .bumps = 3,
                                .order = 1,
-                               .wall_bumps = 5,
+                               .wall_bumps = 4,
                                .output = ASCC_OUTPUT_ANTISYMMETRIC,
                                .radial = !basis,
                                .damping = basis,
@@ -303,7 +303,8 @@ typedef struct crossing {
     int32_t inputs, outputs;
     double voxel; /* of the coarser of the two, m */
     double source_voxel;
-    bool normalize;
+    double hats; /* what hats sum to around a point */
+    bool relu;
 } crossing;
 
 static void add_crossing(writer *w, const crossing *c)
@@ -313,7 +314,7 @@ static void add_crossing(writer *w, const crossing *c)
     if (w->a->sampling == ASCC_SAMPLING_FARTHEST) {
         add_convolution(w, &(convolution){.name = c->name,
                                           .source = c->source,
-                                          .relu = true,
+                                          .relu = c->relu,
                                           .inputs = c->inputs,
                                           .outputs = c->outputs,
                                           .bumps = w->a->bumps,
@@ -323,10 +324,10 @@ static void add_crossing(writer *w, const crossing *c)
                                           .bias = -1.0});
         return;
     }
-    begin_term(w, "transfer", c->source, true);
+    begin_term(w, "transfer", c->source, c->relu);
     (void)snprintf(name, sizeof name, "%s.weight", c->name);
-    add(&w->network, ",\"weight\":\"%s\"%s}", name, c->normalize ? ",\"normalize\":true" : "");
-    add_plain_tensor(w, name, 2, shape, sqrt(2.0 / c->inputs));
+    add(&w->network, ",\"weight\":\"%s\"}", name);
+    add_plain_tensor(w, name, 2, shape, sqrt(2.0 / c->inputs) / c->hats);
 }
 
 /* ---- The BASIS family ---------------------------------------------------------------------------- */
@@ -373,6 +374,20 @@ static void add_wall_convolution(writer *w, const char *layer, int32_t level, in
                                       .voxel = a->spacing,
                                       .gain = gain,
                                       .bias = -1.0});
+}
+
+/* The walls' share of a level's first layer: coarser ones hear of them from there. */
+static void add_wall_transfer(writer *w, const char *layer, int32_t channels)
+{
+    char name[64];
+    (void)snprintf(name, sizeof name, "%s.walls", layer);
+    add_crossing(w, &(crossing){.name = name,
+                                .source = "boundary",
+                                .inputs = wall_channels(w->a),
+                                .outputs = channels,
+                                .voxel = voxel_of(w->a, 1),
+                                .source_voxel = w->a->spacing,
+                                .hats = (double)(1 << w->a->dimension)});
 }
 
 static void first_layer(writer *w)
@@ -435,8 +450,12 @@ static void go_down(writer *w, int32_t level, const char *source, char last[32])
                                 .outputs = channels,
                                 .voxel = voxel_of(a, level),
                                 .source_voxel = voxel_of(a, level - 1),
-                                .normalize = true});
-    add_wall_convolution(w, name, level, channels, 1.0);
+                                .hats = (double)(1 << a->dimension),
+                                .relu = true});
+    if (a->sampling == ASCC_SAMPLING_FARTHEST)
+        add_wall_convolution(w, name, level, channels, 1.0);
+    else if (level == 1)
+        add_wall_transfer(w, name, channels);
     for (int32_t k = 1; k <= a->coarse_layers; k++) {
         char next[32];
         (void)snprintf(next, sizeof next, "c%d_%d", level, k);
@@ -456,7 +475,9 @@ static void add_up(writer *w, const char *layer, int32_t level, const char *sour
                                 .inputs = channels_of(a, level + 1),
                                 .outputs = channels_of(a, level),
                                 .voxel = voxel_of(a, level + 1),
-                                .source_voxel = voxel_of(a, level + 1)});
+                                .source_voxel = voxel_of(a, level + 1),
+                                .hats = 1.0,
+                                .relu = true});
 }
 
 /* From `source`, one level coarser, to layers u and v on `level`, beside `own`, the last on the way
