@@ -191,6 +191,22 @@ static void add_random(model_builder *builder, uint64_t *state, const char *name
     free(values);
 }
 
+/* A tensor [bumps][in] of values within 0 and the amplitude, or within +-amplitude. */
+static void add_pairs(model_builder *builder, uint64_t *state, const char *name, int bumps, int in,
+                      double amplitude, int positive)
+{
+    const size_t shape[2] = {(size_t)bumps, (size_t)in};
+    float *values = calloc(shape[0] * shape[1], sizeof *values);
+    if (!values)
+        abort();
+    for (size_t i = 0; i < shape[0] * shape[1]; i++) {
+        const double random = (double)(next_random(state) >> 11) * 0x1p-52 - 1.0;
+        values[i] = (float)(amplitude * (positive ? fabs(random) : random));
+    }
+    model_builder_tensor(builder, name, 2, shape, values);
+    free(values);
+}
+
 /* name.kernel and name.bias of a convolution (cells > 0) or a dense term. */
 static void add_weights(model_builder *builder, uint64_t *state, const char *name, int dimension,
                         int cells, int in, int out, double gain)
@@ -284,11 +300,14 @@ static void add_filter(random_network *n, int level, const char *window)
 static void add_convolution(random_network *n, const char *name, const char *source, int relu,
                             int column, int level, int in, int out)
 {
+    const int features = strcmp(source, "fluid") == 0 || strcmp(source, "boundary") == 0;
     model_text_add(&n->text,
                    "%s{\"type\":\"convolution\",\"source\":\"%s\",\"relu\":%s,\"column\":%d,"
                    "\"kernel\":\"%s.kernel\",\"bias\":\"%s.bias\"",
                    n->terms++ ? "," : "", source, relu ? "true" : "false", column, name, name);
     add_filter(n, level, n->o.window);
+    if (n->o.relative && features)
+        model_text_add(&n->text, ",\"relative\":true");
     model_text_add(&n->text, ",\"skip_self\":%s}", n->o.skip_self ? "true" : "false");
     if (n->o.bumps)
         add_basis_weights(&n->builder, &n->state, name, n->o.dimension, n->o.bumps, n->o.order, in,
@@ -320,15 +339,16 @@ static void add_dense(random_network *n, const char *name, const char *source, i
 
 static void add_first_layer(random_network *n)
 {
-    const int in = 1 + n->o.dimension, quarter = n->o.channels / 4;
+    const int d = n->o.dimension, quarter = n->o.channels / 4;
+    const int in = 1 + (n->o.motion == 1 ? 2 * d : d), wall_in = 1 + (n->o.motion ? 2 * d : d);
     model_text_add(&n->text, "{\"name\":\"l0.0\",\"points\":\"%s\",\"channels\":%d,\"terms\":[",
                    n->o.fluid_only ? "fluid" : "all", n->o.channels);
     n->terms = 0;
     add_convolution(n, "conv_fluid", "fluid", 0, 0, 0, in, quarter);
-    add_convolution(n, "conv_boundary", "boundary", 0, quarter, 0, in, quarter);
+    add_convolution(n, "conv_boundary", "boundary", 0, quarter, 0, wall_in, quarter);
     add_dense(n, "dense_fluid", "fluid", 0, 2 * quarter, in, 2 * quarter);
     if (!n->o.fluid_only)
-        add_dense(n, "dense_boundary", "boundary", 0, 2 * quarter, in, 2 * quarter);
+        add_dense(n, "dense_boundary", "boundary", 0, 2 * quarter, wall_in, 2 * quarter);
     model_text_add(&n->text, "]}");
 }
 
@@ -372,9 +392,12 @@ static void add_head(random_network *n)
                    "{\"name\":\"random\",\"description\":\"random weights, for tests\","
                    "\"dimension\":%d,\"time_step\":%s,\"gravity\":[0,-9.8125%s],"
                    "\"particle_spacing\":%s,\"rest_density\":1000,\"evaluate\":\"%s\","
-                   "\"features\":{\"fluid\":[\"one\",\"velocity\"],"
-                   "\"boundary\":[\"one\",\"normal\"]}",
-                   o->dimension, model_number(0.005), third, model_number(o->spacing), o->evaluate);
+                   "\"features\":{\"fluid\":[%s],\"boundary\":[\"one\",\"normal\"%s]}",
+                   o->dimension, model_number(0.005), third, model_number(o->spacing), o->evaluate,
+                   o->motion == 2   ? "\"motion\",\"one\""
+                   : o->motion == 1 ? "\"one\",\"velocity\",\"motion\""
+                                    : "\"one\",\"velocity\"",
+                   o->motion ? ",\"motion\"" : "");
     if (o->boundary_crop > 0.0)
         model_text_add(&n->text, ",\"boundary_crop\":%s",
                        model_number(o->boundary_crop * o->spacing));
@@ -391,6 +414,30 @@ static void add_head(random_network *n)
         model_text_add(&n->text, ",\"anchor\":\"%s\"", o->anchor);
     if (strcmp(o->method, "voxel_corners") == 0)
         model_text_add(&n->text, ",\"hysteresis\":%s", model_number(o->no_hysteresis ? 0.0 : 0.1));
+    model_text_add(&n->text, "}");
+}
+
+/* What only an output with a basis has. */
+static void add_central(random_network *n)
+{
+    const model_random *o = &n->o;
+    const double amplitude = o->gain / sqrt((double)o->channels);
+    if (o->direction)
+        model_text_add(&n->text, ",\"direction\":\"current\"");
+    if (o->damping) {
+        model_text_add(&n->text, ",\"damping\":\"output.damping\"");
+        add_pairs(&n->builder, &n->state, "output.damping", o->bumps, o->channels, amplitude, 1);
+    }
+    if (!o->walls)
+        return;
+    model_text_add(&n->text,
+                   ",\"walls\":{\"kernel\":\"walls.kernel\",\"radius\":%s,\"basis\":{\"bumps\":%d}",
+                   model_number(1.3 * o->radius * o->spacing), o->bumps + 1);
+    add_pairs(&n->builder, &n->state, "walls.kernel", o->bumps + 1, o->channels, amplitude, 0);
+    if (o->damping) {
+        model_text_add(&n->text, ",\"damping\":\"walls.damping\"");
+        add_pairs(&n->builder, &n->state, "walls.damping", o->bumps + 1, o->channels, amplitude, 1);
+    }
     model_text_add(&n->text, "}");
 }
 
@@ -413,6 +460,7 @@ static void add_output(random_network *n)
             model_text_add(&n->text, ",\"stored\":\"full\"");
         add_filter(n, 0, NULL);
         add_output_kernel(&n->builder, &n->state, o);
+        add_central(n);
     }
     model_text_add(&n->text, "}}");
 }

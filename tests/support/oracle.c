@@ -1,0 +1,910 @@
+/* Brute force, in doubles. SPDX-License-Identifier: MIT */
+#include "oracle.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#define NOBODY SIZE_MAX
+
+static void *take(size_t count, size_t size)
+{
+    void *memory = calloc(count + 1, size);
+    if (!memory)
+        abort();
+    return memory;
+}
+
+/* ---- Point sets ---- */
+
+typedef struct point {
+    double x[3];
+    size_t particle; /* fluid row, or fluid count + wall row; NOBODY = of a lattice */
+} point;
+
+typedef struct point_set {
+    size_t count;
+    point *point;
+} point_set;
+
+/* Where everything is in one step. */
+struct oracle_record {
+    point_set set[ASCC_MAX_SETS];
+    double *before; /* [fluid][3] positions before the step */
+};
+
+static void free_record(oracle_record *record)
+{
+    for (int s = 0; record && s < ASCC_MAX_SETS; s++)
+        free(record->set[s].point);
+    if (record)
+        free(record->before);
+    free(record);
+}
+
+static point_set make_set(size_t count)
+{
+    return (point_set){count, take(count, sizeof(point))};
+}
+
+static point_set copy_set(const point_set *from)
+{
+    point_set to = make_set(from->count);
+    if (from->count)
+        memcpy(to.point, from->point, from->count * sizeof(point));
+    return to;
+}
+
+static void add_point(point_set *set, const double x[3], size_t particle)
+{
+    set->point[set->count].particle = particle;
+    memcpy(set->point[set->count++].x, x, 3 * sizeof(double));
+}
+
+static void centroid_of(const point_set *all, double center[3])
+{
+    for (int c = 0; c < 3; c++) {
+        center[c] = 0.0;
+        for (size_t i = 0; i < all->count; i++)
+            center[c] += all->point[i].x[c] / (double)all->count;
+    }
+}
+
+/* The point of a cell if it is not there yet; places are compared as whole numbers. */
+static void add_node(point_set *set, double (*cells)[3], const double cell[3], int dimension,
+                     double voxel, double offset, const double anchor[3])
+{
+    double x[3] = {0.0, 0.0, 0.0};
+    for (size_t i = 0; i < set->count; i++)
+        if (cells[i][0] == cell[0] && cells[i][1] == cell[1] && cells[i][2] == cell[2])
+            return;
+    memcpy(cells[set->count], cell, 3 * sizeof(double));
+    for (int c = 0; c < dimension; c++)
+        x[c] = (cell[c] + offset) * voxel + anchor[c];
+    add_point(set, x, NOBODY);
+}
+
+static point_set sample_voxels(const ascc_plan *plan, const point_set *all, double voxel)
+{
+    double anchor[3] = {0.0, 0.0, 0.0};
+    const int corners = 1 << plan->dimension;
+    point_set set = make_set(all->count * 2 * (size_t)corners);
+    double(*cells)[3] = take(set.count, sizeof *cells);
+    set.count = 0;
+    if (plan->centroid_anchor)
+        centroid_of(all, anchor);
+    for (size_t i = 0; i < all->count; i++)
+        for (int side = -1; side <= 1; side += 2) {
+            double cell[3] = {0.0, 0.0, 0.0};
+            const bool centers = plan->sampling == ASCC_SAMPLING_CENTERS;
+            for (int c = 0; c < plan->dimension; c++)
+                cell[c] = floor((all->point[i].x[c] - anchor[c]) / voxel +
+                                (centers ? 0.0 : side * plan->hysteresis));
+            for (int k = 0; k < (centers ? 1 : corners); k++) {
+                const double node[3] = {cell[0] + (k & 1), cell[1] + (k >> 1 & 1),
+                                        cell[2] + (k >> 2)};
+                add_node(&set, cells, node, plan->dimension, voxel, centers ? 0.5 : 0.0, anchor);
+            }
+        }
+    free(cells);
+    return set;
+}
+
+static double square_distance(const double a[3], const double b[3])
+{
+    double square = 0.0;
+    for (int c = 0; c < 3; c++)
+        square += (a[c] - b[c]) * (a[c] - b[c]);
+    return square;
+}
+
+/* The library starts at the first particle in the order of its cells; nothing outside says so. */
+static size_t first_in_cells(const ascc_plan *plan, const point_set *all)
+{
+    double smallest = INFINITY, largest = 0.0;
+    for (int32_t t = 0; t <= plan->term_count; t++) {
+        const bool last = t == plan->term_count;
+        if (last ? plan->output.kind != ASCC_OUTPUT_ANTISYMMETRIC
+                 : !ascc_term_searches(&plan->term[t]))
+            continue;
+        const double radius = last ? plan->output.filter.radius : plan->term[t].filter.radius;
+        smallest = fmin(smallest, radius);
+        largest = fmax(largest, radius);
+        if (last && plan->output.walls.present) {
+            smallest = fmin(smallest, plan->output.walls.filter.radius);
+            largest = fmax(largest, plan->output.walls.filter.radius);
+        }
+    }
+    int exponent;
+    (void)frexp(largest, &exponent);
+    const double cell = smallest * (1.0 + 1.0 / 2048.0) + ldexp(1.0, exponent - 27);
+    size_t first = 0;
+    for (size_t i = 1; i < all->count; i++) {
+        int order = 0;
+        for (int pass = 0; order == 0 && pass < 2; pass++)
+            for (int c = 2; order == 0 && c >= 0; c--) {
+                const double a = all->point[i].x[c], b = all->point[first].x[c];
+                const double u = pass ? a : floor(a / cell), v = pass ? b : floor(b / cell);
+                order = (u > v) - (u < v);
+            }
+        first = order < 0 ? i : first;
+    }
+    return first;
+}
+
+static point_set sample_farthest(const ascc_plan *plan, const point_set *all, double ratio)
+{
+    const size_t count = (size_t)ceil(ratio * (double)all->count);
+    point_set set = make_set(count);
+    double *nearest = take(all->count, sizeof *nearest);
+    size_t last = first_in_cells(plan, all);
+    for (size_t i = 0; i < all->count; i++)
+        nearest[i] = INFINITY;
+    for (set.count = 0; set.count < count;) {
+        add_point(&set, all->point[last].x, all->point[last].particle);
+        size_t farthest = 0;
+        nearest[last] = -1.0;
+        for (size_t i = 0; i < all->count; i++) {
+            nearest[i] = fmin(nearest[i], square_distance(all->point[i].x, all->point[last].x));
+            if (nearest[i] > nearest[farthest])
+                farthest = i;
+        }
+        last = farthest;
+    }
+    free(nearest);
+    return set;
+}
+
+static bool in_sight(const oracle *o, const point_set *fluid, const double x[3])
+{
+    const ascc_plan *plan = &o->model->plan;
+    for (int c = 0; plan->boundary_crop > 0.0 && c < plan->dimension; c++) {
+        double low = INFINITY, high = -INFINITY;
+        for (size_t i = 0; i < fluid->count; i++) {
+            low = fmin(low, fluid->point[i].x[c]);
+            high = fmax(high, fluid->point[i].x[c]);
+        }
+        if (x[c] < low - plan->boundary_crop || x[c] > high + plan->boundary_crop)
+            return false;
+    }
+    return true;
+}
+
+static oracle_record *build_sets(const oracle *o, const double *before, const double *seen)
+{
+    const ascc_plan *plan = &o->model->plan;
+    const size_t d = (size_t)plan->dimension;
+    const oracle_record *old = o->mode >= ORACLE_LATTICES ? o->record[o->step] : NULL;
+    oracle_record *r = take(1, sizeof *r);
+    point_set *fluid = &r->set[ASCC_SET_FLUID], *walls = &r->set[ASCC_SET_BOUNDARY];
+    point_set *all = &r->set[ASCC_SET_ALL];
+    *fluid = make_set(o->fluid_count);
+    r->before = take(o->fluid_count * 3, sizeof(double));
+    for (size_t i = 0; i < o->fluid_count; i++) {
+        fluid->point[i].particle = i;
+        for (size_t c = 0; c < d; c++) {
+            fluid->point[i].x[c] = seen[i * d + c];
+            r->before[i * 3 + c] = before[i * d + c];
+        }
+        if (o->mode == ORACLE_POSITIONS) {
+            fluid->point[i] = old->set[ASCC_SET_FLUID].point[i];
+            memcpy(r->before + i * 3, old->before + i * 3, 3 * sizeof(double));
+        }
+    }
+    *walls = old ? copy_set(&old->set[ASCC_SET_BOUNDARY]) : make_set(o->wall_count);
+    if (!old) {
+        walls->count = 0;
+        for (size_t i = 0; i < o->wall_count; i++) {
+            double x[3] = {0.0, 0.0, 0.0};
+            memcpy(x, o->wall + i * d, d * sizeof(double));
+            if (in_sight(o, fluid, x))
+                add_point(walls, x, o->fluid_count + i);
+        }
+    }
+    *all = make_set(fluid->count + walls->count);
+    memcpy(all->point, fluid->point, fluid->count * sizeof(point));
+    if (walls->count)
+        memcpy(all->point + fluid->count, walls->point, walls->count * sizeof(point));
+    for (int32_t l = 1; l < plan->level_count; l++)
+        r->set[ASCC_SET_LEVEL + l - 1] =
+            old ? copy_set(&old->set[ASCC_SET_LEVEL + l - 1])
+            : plan->sampling == ASCC_SAMPLING_FARTHEST
+                ? sample_farthest(plan, all, plan->level[l].ratio)
+                : sample_voxels(plan, all, plan->level[l].voxel);
+    return r;
+}
+
+/* ---- Kernels ---- */
+
+static double bump_at(int bumps, int k, double rho)
+{
+    const double t = bumps * rho - k, bell = fmax(0.0, 1.0 - t * t);
+    return bell * bell;
+}
+
+static void basis_factors(const ascc_filter *filter, int dimension, const double d[3], double rho,
+                          double *factor)
+{
+    const double length = sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
+    const double x = length > 0.0 ? d[0] / length : 0.0, y = length > 0.0 ? d[1] / length : 0.0;
+    const double z = length > 0.0 ? d[2] / length : 0.0, root = sqrt(3.0);
+    const double flat[5] = {1.0, x, y, 2.0 * x * y, x * x - y * y};
+    const double full[9] = {1.0,
+                            x,
+                            y,
+                            z,
+                            root * x * y,
+                            root * y * z,
+                            root * z * x,
+                            root / 2.0 * (x * x - y * y),
+                            z * z - (x * x + y * y) / 2.0};
+    const int harmonics = dimension == 2 ? 2 * filter->order + 1
+                                         : (filter->order + 1) * (filter->order + 1);
+    for (int k = 0; k < filter->bumps; k++)
+        for (int m = 0; m < harmonics; m++)
+            factor[k * harmonics + m] =
+                bump_at(filter->bumps, k, rho) * (dimension == 2 ? flat : full)[m];
+}
+
+/* SEMANTICS section 2, steps 2 and 3: ball to cylinder, cylinder to cube. */
+static void map_volume(double p[3])
+{
+    const double pi = acos(-1.0);
+    const double flat = hypot(p[0], p[1]), n = hypot(flat, p[2]);
+    if (n == 0.0)
+        return;
+    const bool cap = 1.25 * p[2] * p[2] > flat * flat;
+    const double s = cap ? sqrt(3.0 * n / (n + fabs(p[2]))) : n / flat;
+    p[2] = cap ? copysign(n, p[2]) : 1.5 * p[2];
+    const double x = p[0] * s, y = p[1] * s, h = hypot(x, y);
+    p[0] = p[1] = 0.0;
+    if (h == 0.0)
+        return;
+    if (fabs(y) <= fabs(x)) {
+        p[0] = copysign(h, x);
+        p[1] = p[0] * 4.0 / pi * atan(y / x);
+    } else {
+        p[1] = copysign(h, y);
+        p[0] = p[1] * 4.0 / pi * atan(x / y);
+    }
+}
+
+static void map_to_cube(ascc_mapping mapping, double p[3])
+{
+    const double n = sqrt(p[0] * p[0] + p[1] * p[1] + p[2] * p[2]);
+    const double largest = fmax(fabs(p[0]), fmax(fabs(p[1]), fabs(p[2])));
+    if (mapping == ASCC_MAPPING_VOLUME)
+        map_volume(p);
+    else if (mapping == ASCC_MAPPING_RADIAL && n > 0.0)
+        for (int c = 0; c < 3; c++)
+            p[c] *= n / largest;
+}
+
+static double window_at(ascc_window window, double rho)
+{
+    return window == ASCC_WINDOW_POLY6  ? pow(fmax(0.0, 1.0 - rho * rho), 3.0)
+           : window == ASCC_WINDOW_PEAK ? pow(fmax(0.0, 1.0 - rho), 2.0)
+                                        : 1.0;
+}
+
+/* Window times trilinear weights, [z][y][x]. */
+static void grid_factors(const ascc_filter *filter, const double d[3], double rho, double *factor)
+{
+    double p[3] = {d[0] / filter->radius, d[1] / filter->radius, d[2] / filter->radius};
+    double part[3];
+    int low[3], high[3];
+    map_to_cube(filter->mapping, p);
+    for (int c = 0; c < 3; c++) {
+        const int size = filter->cells[c];
+        const double at = (p[c] / 2.0 + 0.5) * (size - 1);
+        low[c] = (int)fmin(fmax(floor(at), 0.0), size > 1 ? size - 2 : 0);
+        high[c] = low[c] + 1 < size ? low[c] + 1 : size - 1;
+        part[c] = size > 1 ? fmin(fmax(at - low[c], 0.0), 1.0) : 0.0;
+    }
+    memset(factor, 0,
+           (size_t)(filter->cells[0] * filter->cells[1] * filter->cells[2]) * sizeof *factor);
+    for (int corner = 0; corner < 8; corner++) {
+        int at[3];
+        double share = window_at(filter->window, rho);
+        for (int c = 0; c < 3; c++) {
+            const bool up = corner >> c & 1;
+            at[c] = up ? high[c] : low[c];
+            share *= up ? part[c] : 1.0 - part[c];
+        }
+        factor[(at[2] * filter->cells[1] + at[1]) * filter->cells[0] + at[0]] += share;
+    }
+}
+
+static double hat_at(int dimension, const double d[3], double voxel)
+{
+    double hat = 1.0;
+    for (int c = 0; c < dimension; c++)
+        hat *= fmax(0.0, 1.0 - fabs(d[c]) / voxel);
+    return hat;
+}
+
+/* ---- Layers ---- */
+
+typedef struct values {
+    int32_t set, channels;
+    double *row; /* [set count][channels] */
+} values;
+
+typedef struct network_state {
+    const oracle *o;
+    const oracle_record *sets;
+    values *value;
+} network_state;
+
+static double weight_at(const oracle *o, const float *pointer, size_t index)
+{
+    return o->weight[(size_t)(pointer - o->model->weights) + index];
+}
+
+static double read_value(const network_state *n, int32_t value, bool rectify, size_t row, int32_t a)
+{
+    const values *v = &n->value[value];
+    const double x = v->row[row * (size_t)v->channels + (size_t)a];
+    return rectify && x < 0.0 ? 0.0 : x;
+}
+
+static int32_t motion_channel(const int32_t *feature, int32_t count, int dimension)
+{
+    int32_t channel = 0;
+    for (int32_t f = 0; f < count; f++) {
+        if (feature[f] == ASCC_FEATURE_MOTION)
+            return channel;
+        channel += feature[f] == ASCC_FEATURE_ONE ? 1 : dimension;
+    }
+    return -1;
+}
+
+/* A fluid particle's motion; that of walls is 0. */
+static double motion_of(const network_state *n, size_t fluid, int component)
+{
+    const ascc_plan *plan = &n->o->model->plan;
+    const int32_t first =
+        motion_channel(plan->fluid_features, plan->fluid_feature_count, plan->dimension);
+    return n->value[0].row[fluid * (size_t)plan->fluid_channels + (size_t)(first + component)];
+}
+
+/* What a convolution reads of a neighbour. */
+static double source_of(const network_state *n, const ascc_term *term, size_t query, size_t row,
+                        int32_t channel)
+{
+    const ascc_plan *plan = &n->o->model->plan;
+    double x = read_value(n, term->source, term->rectify != 0, row, channel);
+    if (term->relative) {
+        const int32_t first =
+            term->source == 0
+                ? motion_channel(plan->fluid_features, plan->fluid_feature_count, plan->dimension)
+                : motion_channel(plan->boundary_features, plan->boundary_feature_count,
+                                 plan->dimension);
+        if (channel >= first && channel < first + plan->dimension)
+            x -= motion_of(n, query, channel - first);
+    }
+    return x;
+}
+
+static void add_product(const network_state *n, const ascc_term *term, size_t cell,
+                        const double *in, double *out)
+{
+    for (int32_t b = 0; b < term->outputs; b++)
+        for (int32_t a = 0; a < term->inputs; a++)
+            out[b] += in[a] * weight_at(n->o, term->weight,
+                                        (cell * (size_t)term->inputs + (size_t)a) *
+                                                (size_t)term->outputs +
+                                            (size_t)b);
+}
+
+static double displacement(const point *to, const point *from, double d[3])
+{
+    double square = 0.0;
+    for (int c = 0; c < 3; c++) {
+        d[c] = to->particle == from->particle && to->particle != NOBODY ? 0.0
+                                                                        : to->x[c] - from->x[c];
+        square += d[c] * d[c];
+    }
+    return sqrt(square);
+}
+
+static void convolve(const network_state *n, const ascc_layer *layer, const ascc_term *term,
+                     size_t row, double *out)
+{
+    const ascc_filter *f = &term->filter;
+    const int dimension = n->o->model->plan.dimension;
+    const size_t cells = (size_t)f->cells[0] * (size_t)f->cells[1] * (size_t)f->cells[2];
+    const size_t inputs = (size_t)term->inputs;
+    const point_set *source = &n->sets->set[n->value[term->source].set];
+    const point *query = &n->sets->set[layer->set].point[row];
+    double *factor = take(cells, sizeof *factor), *column = take(cells * inputs, sizeof *column);
+    for (size_t j = 0; j < source->count; j++) {
+        double d[3];
+        const double length = displacement(&source->point[j], query, d);
+        if (length > f->radius || (f->skip_self && length == 0.0))
+            continue;
+        if (f->bumps)
+            basis_factors(f, dimension, d, length / f->radius, factor);
+        else
+            grid_factors(f, d, length / f->radius, factor);
+        for (size_t a = 0; a < inputs; a++) {
+            const double x = source_of(n, term, row, j, (int32_t)a);
+            for (size_t c = 0; c < cells; c++)
+                column[c * inputs + a] += factor[c] * x;
+        }
+    }
+    for (size_t c = 0; c < cells; c++)
+        add_product(n, term, c, column + c * inputs, out);
+    free(column);
+    free(factor);
+}
+
+static void transfer(const network_state *n, const ascc_layer *layer, const ascc_term *term,
+                     size_t row, double *out)
+{
+    const point_set *source = &n->sets->set[n->value[term->source].set];
+    const point *query = &n->sets->set[layer->set].point[row];
+    double *in = take((size_t)term->inputs, sizeof *in), hats = 0.0;
+    for (size_t j = 0; j < source->count; j++) {
+        double d[3];
+        displacement(&source->point[j], query, d);
+        const double hat = hat_at(n->o->model->plan.dimension, d, term->voxel);
+        hats += hat;
+        for (int32_t a = 0; hat > 0.0 && a < term->inputs; a++)
+            in[a] += hat * read_value(n, term->source, term->rectify != 0, j, a);
+    }
+    for (int32_t a = 0; term->normalize && hats > 0.0 && a < term->inputs; a++)
+        in[a] /= hats;
+    add_product(n, term, 0, in, out);
+    free(in);
+}
+
+/* The source's row that is the layer's; false where there is none. */
+static bool shared_row(const network_state *n, int32_t source, int32_t set, size_t row, size_t *at)
+{
+    const size_t fluid = n->sets->set[ASCC_SET_FLUID].count;
+    *at = row;
+    if (source == set)
+        return true;
+    if (set == ASCC_SET_ALL) {
+        *at = source == ASCC_SET_FLUID ? row : row - fluid;
+        return (row < fluid) == (source == ASCC_SET_FLUID);
+    }
+    *at = set == ASCC_SET_FLUID ? row : row + fluid; /* part of all */
+    return true;
+}
+
+static void add_term(const network_state *n, const ascc_layer *layer, const ascc_term *term,
+                     size_t row, double *out)
+{
+    size_t from = 0;
+    if (!ascc_term_searches(term) &&
+        !shared_row(n, n->value[term->source].set, layer->set, row, &from))
+        return;
+    if (term->kind == ASCC_TERM_CONVOLUTION) {
+        convolve(n, layer, term, row, out);
+    } else if (term->kind == ASCC_TERM_TRANSFER) {
+        transfer(n, layer, term, row, out);
+    } else {
+        double *in = take((size_t)term->inputs, sizeof *in);
+        for (int32_t a = 0; a < term->inputs; a++)
+            in[a] = read_value(n, term->source, term->rectify != 0, from, a);
+        if (term->kind == ASCC_TERM_DENSE)
+            add_product(n, term, 0, in, out);
+        for (int32_t a = 0; term->kind == ASCC_TERM_IDENTITY && a < term->inputs; a++)
+            out[a] += in[a];
+        free(in);
+    }
+    for (int32_t b = 0; term->bias && b < term->outputs; b++)
+        out[b] += weight_at(n->o, term->bias, (size_t)b);
+}
+
+static values make_values(const network_state *n, int32_t set, int32_t channels)
+{
+    const size_t count = n->sets->set[set].count;
+    return (values){set, channels, take(count * (size_t)channels, sizeof(double))};
+}
+
+static void run_layer(network_state *n, int32_t l)
+{
+    const ascc_plan *plan = &n->o->model->plan;
+    const ascc_layer *layer = &plan->layer[l];
+    values *v = &n->value[l + 2];
+    *v = make_values(n, layer->set, layer->channels);
+    for (size_t row = 0; row < n->sets->set[layer->set].count; row++)
+        for (int32_t t = layer->first_term; t < layer->first_term + layer->term_count; t++)
+            add_term(n, layer, &plan->term[t], row,
+                     v->row + row * (size_t)layer->channels + plan->term[t].column);
+}
+
+static void set_features(const ascc_plan *plan, const int32_t *feature, int32_t count,
+                         const double *vector, bool wall, double *to)
+{
+    for (int32_t f = 0; f < count; f++)
+        if (feature[f] == ASCC_FEATURE_ONE)
+            *to++ = 1.0;
+        else
+            for (int c = 0; c < plan->dimension; c++)
+                *to++ = feature[f] != ASCC_FEATURE_MOTION ? vector[c]
+                        : wall ? 0.0
+                               : vector[c] * plan->time_step / plan->spacing;
+}
+
+static void run_layers(network_state *n, const double *velocity)
+{
+    const oracle *o = n->o;
+    const ascc_plan *plan = &o->model->plan;
+    const size_t d = (size_t)plan->dimension;
+    n->value[0] = make_values(n, ASCC_SET_FLUID, plan->fluid_channels);
+    n->value[1] = make_values(n, ASCC_SET_BOUNDARY, plan->boundary_channels);
+    for (size_t i = 0; i < o->fluid_count; i++)
+        set_features(plan, plan->fluid_features, plan->fluid_feature_count, velocity + i * d, false,
+                     n->value[0].row + i * (size_t)plan->fluid_channels);
+    for (size_t i = 0; i < n->sets->set[ASCC_SET_BOUNDARY].count; i++) {
+        const size_t wall = n->sets->set[ASCC_SET_BOUNDARY].point[i].particle - o->fluid_count;
+        set_features(plan, plan->boundary_features, plan->boundary_feature_count,
+                     o->normal + wall * d, true,
+                     n->value[1].row + i * (size_t)plan->boundary_channels);
+    }
+    for (int32_t l = 0; l < plan->layer_count; l++)
+        run_layer(n, l);
+}
+
+/* ---- The output ---- */
+
+/* The whole last kernel from what is stored. A kernel stored whole is odd; moved weights are made so. */
+static double odd_kernel(const oracle *o, const int at[3], size_t value, size_t per_cell)
+{
+    const ascc_output *output = &o->model->plan.output;
+    const int32_t *n = output->filter.cells;
+    if (o->half_axis < 0) {
+        const size_t cell = (size_t)((at[2] * n[1] + at[1]) * n[0] + at[0]);
+        const size_t mirror = (size_t)(n[0] * n[1] * n[2] - 1) - cell;
+        return 0.5 * (weight_at(o, output->weight, cell * per_cell + value) -
+                      weight_at(o, output->weight, mirror * per_cell + value));
+    }
+    int own[3] = {at[0], at[1], at[2]}, size[3] = {n[0], n[1], n[2]};
+    size[o->half_axis] /= 2;
+    const bool lower = at[o->half_axis] < size[o->half_axis];
+    for (int c = 0; lower && c < 3; c++)
+        own[c] = n[c] - 1 - at[c];
+    own[o->half_axis] -= size[o->half_axis];
+    const size_t cell = (size_t)((own[2] * size[1] + own[1]) * size[0] + own[0]);
+    return (lower ? -1.0 : 1.0) * o->weight[o->half + cell * per_cell + value];
+}
+
+static void grid_pair(const network_state *n, const double *sum, const double d[3], double length,
+                      double *correction)
+{
+    const ascc_plan *plan = &n->o->model->plan;
+    const ascc_output *output = &plan->output;
+    const int32_t *cells = output->filter.cells;
+    const size_t d_count = (size_t)plan->dimension, inputs = (size_t)output->inputs;
+    double *factor = take((size_t)cells[0] * (size_t)cells[1] * (size_t)cells[2], sizeof *factor);
+    double term[3] = {0.0, 0.0, 0.0}, along = 0.0;
+    grid_factors(&output->filter, d, length / output->filter.radius, factor);
+    for (int z = 0, cell = 0; z < cells[2]; z++)
+        for (int y = 0; y < cells[1]; y++)
+            for (int x = 0; x < cells[0]; x++, cell++)
+                for (size_t k = 0; factor[cell] != 0.0 && k < inputs * d_count; k++)
+                    term[k % d_count] += factor[cell] * sum[k / d_count] *
+                                         odd_kernel(n->o, (const int[3]){x, y, z}, k,
+                                                    inputs * d_count);
+    free(factor);
+    for (size_t c = 0; c < d_count; c++) {
+        term[c] *= output->scale[c];
+        along += term[c] * d[c] / length;
+    }
+    for (size_t c = 0; c < d_count; c++)
+        correction[c] += output->radial ? along * d[c] / length : term[c];
+}
+
+/* Sum over bumps and inputs of phi f tensor. */
+static double strength_of(const network_state *n, const ascc_filter *filter, const float *tensor,
+                          const double *f, double length)
+{
+    const int32_t inputs = n->o->model->plan.output.inputs;
+    double strength = 0.0;
+    for (int k = 0; tensor && length < filter->radius && k < filter->bumps; k++)
+        for (int32_t a = 0; a < inputs; a++)
+            strength += bump_at(filter->bumps, k, length / filter->radius) * f[a] *
+                        weight_at(n->o, tensor, (size_t)(k * inputs + a));
+    return strength;
+}
+
+/* A pair along a line: i is a fluid particle, j another or (NOBODY) a wall at wall_at. */
+static void central_pair(const network_state *n, const ascc_filter *filter, const float *tensor,
+                         const float *damping, const double *f, const double seen[3], size_t i,
+                         size_t j, const double *wall_at, double *correction)
+{
+    const ascc_plan *plan = &n->o->model->plan;
+    const double length = sqrt(seen[0] * seen[0] + seen[1] * seen[1] + seen[2] * seen[2]);
+    double line[3] = {seen[0], seen[1], seen[2]}, approach = 0.0;
+    for (int c = 0; plan->output.current_direction && c < 3; c++)
+        line[c] = (wall_at ? wall_at : n->sets->before + j * 3)[c] - n->sets->before[i * 3 + (size_t)c];
+    const double across = sqrt(line[0] * line[0] + line[1] * line[1] + line[2] * line[2]);
+    if (across == 0.0 || length == 0.0)
+        return;
+    double strength = strength_of(n, filter, tensor, f, length);
+    for (int c = 0; damping && c < plan->dimension; c++)
+        approach += (motion_of(n, i, c) - (wall_at ? 0.0 : motion_of(n, j, c))) * line[c] / across;
+    if (damping)
+        strength -= strength_of(n, filter, damping, f, length) * approach;
+    for (int c = 0; c < plan->dimension; c++)
+        correction[c] += plan->output.scale[0] * strength * line[c] / across;
+}
+
+static void correct_particle(const network_state *n, size_t i, double *correction)
+{
+    const ascc_plan *plan = &n->o->model->plan;
+    const ascc_output *output = &plan->output;
+    const values *v = &n->value[output->source];
+    const bool rectify = output->rectify != 0;
+    const point_set *set = &n->sets->set[v->set], *walls = &n->sets->set[ASCC_SET_BOUNDARY];
+    double *f = take((size_t)output->inputs, sizeof *f), d[3];
+    for (size_t j = 0; j < set->count; j++) {
+        const double length = displacement(&set->point[j], &set->point[i], d);
+        if (length > output->filter.radius || length == 0.0)
+            continue;
+        for (int32_t a = 0; a < output->inputs; a++)
+            f[a] = read_value(n, output->source, rectify, i, a) +
+                   read_value(n, output->source, rectify, j, a);
+        if (!output->filter.bumps) {
+            grid_pair(n, f, d, length, correction);
+            continue;
+        }
+        const bool wall = j >= n->o->fluid_count;
+        central_pair(n, &output->filter, output->weight, output->damping, f, d, i, j,
+                     wall ? set->point[j].x : NULL, correction);
+    }
+    for (int32_t a = 0; a < output->inputs; a++)
+        f[a] = read_value(n, output->source, rectify, i, a);
+    for (size_t j = 0; output->walls.present && j < walls->count; j++) {
+        displacement(&walls->point[j], &set->point[i], d);
+        central_pair(n, &output->walls.filter, output->walls.weight, output->walls.damping, f, d, i,
+                     NOBODY, walls->point[j].x, correction);
+    }
+    free(f);
+}
+
+static void run_output(const network_state *n, double *correction)
+{
+    const ascc_plan *plan = &n->o->model->plan;
+    const ascc_output *output = &plan->output;
+    const size_t d = (size_t)plan->dimension;
+    for (size_t i = 0; i < n->o->fluid_count; i++) {
+        for (size_t c = 0; output->kind == ASCC_OUTPUT_PLAIN && c < d; c++)
+            correction[i * d + c] =
+                output->scale[c] *
+                read_value(n, output->source, output->rectify != 0, i, (int32_t)c);
+        if (output->kind == ASCC_OUTPUT_ANTISYMMETRIC)
+            correct_particle(n, i, correction + i * d);
+    }
+}
+
+/* ---- A step ---- */
+
+void oracle_step(oracle *o, double *position, double *velocity, double *correction)
+{
+    const ascc_plan *plan = &o->model->plan;
+    const size_t d = (size_t)plan->dimension, numbers = o->fluid_count * d;
+    const double dt = plan->time_step;
+    double *after = take(numbers, sizeof *after), *seen = take(numbers, sizeof *seen);
+    double *moved = take(numbers, sizeof *moved);
+    for (size_t k = 0; k < numbers; k++) {
+        after[k] = velocity[k] + dt * o->gravity[k % d];
+        seen[k] = position[k] + (plan->advection == ASCC_ADVECT_NONE  ? 0.0
+                                 : plan->advection == ASCC_ADVECT_END ? dt * after[k]
+                                                                      : dt * 0.5 * (velocity[k] + after[k]));
+    }
+    oracle_record *sets = build_sets(o, position, seen);
+    network_state n = {o, sets, take((size_t)plan->layer_count + 2, sizeof(values))};
+    run_layers(&n, after);
+    run_output(&n, moved);
+    for (size_t k = 0; k < numbers; k++) {
+        const double carried =
+            plan->advection == ASCC_ADVECT_MEAN ? 0.5 * (velocity[k] + after[k]) : after[k];
+        velocity[k] = carried + moved[k] / dt;
+        position[k] += dt * velocity[k];
+        if (correction)
+            correction[k] = moved[k];
+    }
+    for (int32_t v = 0; v < plan->layer_count + 2; v++)
+        free(n.value[v].row);
+    free(n.value);
+    free(moved);
+    free(seen);
+    free(after);
+    if (o->mode == ORACLE_RECORD) {
+        free_record(o->record[o->step]);
+        o->record[o->step] = sets;
+    } else {
+        free_record(sets);
+    }
+    o->step++;
+}
+
+oracle oracle_open(const ascc_model *model, const double *weight)
+{
+    oracle o = {.model = model, .weight = weight, .half_axis = -1};
+    memcpy(o.gravity, model->plan.gravity, sizeof o.gravity);
+    return o;
+}
+
+void oracle_close(oracle *o)
+{
+    for (int s = 0; s < ORACLE_MAX_STEPS; s++) {
+        free_record(o->record[s]);
+        o->record[s] = NULL;
+    }
+}
+
+/* ---- The loss ---- */
+
+static int ascending(const void *a, const void *b)
+{
+    const double x = *(const double *)a, y = *(const double *)b;
+    return (x > y) - (x < y);
+}
+
+/* Between the two nearest ranks, as numpy.percentile. Sorts the values. */
+static double percentile(double *value, size_t count, double share)
+{
+    qsort(value, count, sizeof *value, ascending);
+    const double at = share * (double)(count - 1);
+    const size_t low = (size_t)floor(at), high = low + 1 < count ? low + 1 : low;
+    return value[low] + (at - (double)low) * (value[high] - value[low]);
+}
+
+static double distance(const double *a, const double *b, size_t d)
+{
+    double square = 0.0;
+    for (size_t c = 0; c < d; c++)
+        square += (a[c] - b[c]) * (a[c] - b[c]);
+    return sqrt(square);
+}
+
+static double density_of(const oracle *o, const double *x, size_t i)
+{
+    const size_t d = (size_t)o->model->plan.dimension;
+    double rho = 0.0;
+    for (size_t j = 0; j < o->fluid_count; j++) {
+        const double q = distance(x + i * d, x + j * d, d) / (2.0 * o->model->plan.spacing);
+        rho += pow(fmax(0.0, 1.0 - q * q), 3.0);
+    }
+    return rho;
+}
+
+/* How far a place is into the fluid from its nearest wall within `reach`; false without one. */
+static bool clearance(const oracle *o, const double *x, double reach, double *s)
+{
+    const size_t d = (size_t)o->model->plan.dimension;
+    size_t nearest = NOBODY;
+    double least = reach;
+    for (size_t b = 0; b < o->wall_count; b++)
+        if (distance(x, o->wall + b * d, d) <= least) {
+            least = distance(x, o->wall + b * d, d);
+            nearest = b;
+        }
+    *s = 0.0;
+    for (size_t c = 0; nearest != NOBODY && c < d; c++)
+        *s += (x[c] - o->wall[nearest * d + c]) * o->normal[nearest * d + c];
+    return nearest != NOBODY;
+}
+
+static void true_frame(const oracle *o, const oracle_sequence *sequence, size_t frame, double *x)
+{
+    const size_t numbers = o->fluid_count * (size_t)o->model->plan.dimension;
+    for (size_t k = 0; k < numbers; k++)
+        x[k] = (double)sequence->position[frame * numbers + k];
+}
+
+/* rho_95 and s_05 of a sequence. */
+static void references_of(const oracle *o, const oracle_sequence *sequence, double *rho,
+                          double *clear)
+{
+    const size_t d = (size_t)o->model->plan.dimension, n = o->fluid_count;
+    double *all = take(sequence->frame_count * n, sizeof *all), *x = take(n * d, sizeof *x);
+    double *near = take(sequence->frame_count * n, sizeof *near);
+    size_t count = 0;
+    for (size_t t = 0; t < sequence->frame_count; t++) {
+        true_frame(o, sequence, t, x);
+        for (size_t i = 0; i < n; i++) {
+            all[t * n + i] = density_of(o, x, i);
+            count += clearance(o, x + i * d, o->model->plan.spacing, &near[count]);
+        }
+    }
+    *rho = percentile(all, sequence->frame_count * n, 0.95);
+    *clear = count ? percentile(near, count, 0.05) : -INFINITY;
+    free(near);
+    free(x);
+    free(all);
+}
+
+/* Within which radius the last layer sees: ascc_model_info says the same. */
+static double support_radius(const ascc_plan *plan)
+{
+    const ascc_layer *layer = &plan->layer[plan->output.source - 2];
+    double radius = 0.0;
+    if (plan->output.kind == ASCC_OUTPUT_ANTISYMMETRIC)
+        return plan->output.filter.radius;
+    for (int32_t t = layer->first_term; t < layer->first_term + layer->term_count; t++)
+        if (ascc_term_searches(&plan->term[t]))
+            radius = fmax(radius, plan->term[t].filter.radius);
+    return radius;
+}
+
+static double frame_loss(const oracle *o, const double *x, const double *y,
+                         const oracle_loss_options *options, double rho, double clear)
+{
+    const size_t d = (size_t)o->model->plan.dimension, n = o->fluid_count;
+    const double h = o->model->plan.spacing, radius = support_radius(&o->model->plan);
+    const double share = options->neighbor_weight == 0.0  ? 1.0
+                         : options->neighbor_weight < 0.0 ? 0.0
+                                                          : options->neighbor_weight;
+    double *c = take(n, sizeof *c), mean = 0.0, sum = 0.0, weights = 0.0, penalty = 0.0;
+    for (size_t i = 0; i < n; i++) {
+        for (size_t j = 0; j < n; j++)
+            c[i] += j != i && distance(y + i * d, y + j * d, d) <= radius;
+        mean += c[i] / (double)n;
+    }
+    for (size_t i = 0; i < n; i++) {
+        double s;
+        const double w = mean > 0.0 ? exp(-share * c[i] / mean) : 1.0;
+        weights += w;
+        sum += w * distance(x + i * d, y + i * d, d) / h;
+        penalty += options->density_weight / (double)n *
+                   pow(fmax(0.0, density_of(o, x, i) / rho - 1.0), 2.0);
+        if (clearance(o, x + i * d, 4.0 * h, &s))
+            penalty += options->wall_weight / (double)n * pow(fmax(0.0, (clear - s) / h), 2.0);
+    }
+    free(c);
+    return sum / weights + penalty;
+}
+
+double oracle_loss(oracle *o, const oracle_sequence *sequence, const oracle_loss_options *options,
+                   size_t frame, int presteps, int horizon)
+{
+    const size_t numbers = o->fluid_count * (size_t)o->model->plan.dimension;
+    double *x = take(numbers, sizeof *x), *v = take(numbers, sizeof *v);
+    double *y = take(numbers, sizeof *y), rho, clear, loss = 0.0;
+    references_of(o, sequence, &rho, &clear);
+    true_frame(o, sequence, frame - 1, y);
+    true_frame(o, sequence, frame, x);
+    for (size_t k = 0; k < numbers; k++)
+        v[k] = (x[k] - y[k]) / o->model->plan.time_step;
+    o->step = 0;
+    const double *moved = o->weight;
+    for (int t = 1; t <= presteps + horizon; t++) {
+        o->weight = t <= presteps && o->still ? o->still : moved;
+        oracle_step(o, x, v, NULL);
+        true_frame(o, sequence, frame + (size_t)t, y);
+        if (t > presteps)
+            loss += frame_loss(o, x, y, options, rho, clear) / horizon;
+    }
+    o->weight = moved;
+    free(y);
+    free(v);
+    free(x);
+    return loss;
+}

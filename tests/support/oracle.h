@@ -1,0 +1,60 @@
+/* A whole step and the loss of training from their definitions alone: docs/file-format.md and
+ * docs/training.md in doubles over all pairs, without a grid, a kernel or a demand of the library's.
+ * SPDX-License-Identifier: MIT
+ *
+ * Weights come as doubles beside the model's own block, so that they can be moved by less than a float.
+ * Running out of memory aborts: these are tests.
+ */
+#ifndef ASCC_ORACLE_H
+#define ASCC_ORACLE_H
+
+#include "model.h"
+
+/* What stays as it was in an earlier, recorded rollout: gradients do not flow through it. */
+typedef enum oracle_mode {
+    ORACLE_LIVE,
+    ORACLE_RECORD,    /* live, and remembered */
+    ORACLE_LATTICES,  /* points of levels and the walls in sight are the recorded ones */
+    ORACLE_POSITIONS, /* so are all positions that geometry is made of */
+} oracle_mode;
+
+#define ORACLE_MAX_STEPS 16
+
+typedef struct oracle_record oracle_record; /* of one step */
+
+typedef struct oracle {
+    const ascc_model *model;
+    const double *weight; /* [model->weight_count], beside model->weights */
+    const double *still;  /* the weights of steps that no gradient flows through; NULL = the same */
+    int half_axis;        /* of the output's kernel stored as a half: 0, 1, 2; -1 = stored whole */
+    size_t half;          /* where that half begins in the block */
+    double gravity[3];
+    size_t fluid_count, wall_count;
+    const double *wall, *normal; /* [wall_count][dimension] */
+    oracle_mode mode;
+    int step; /* of the rollout: which record */
+    oracle_record *record[ORACLE_MAX_STEPS];
+} oracle;
+
+/* For a model with its weights as doubles, the caller's; the rest is set in the struct. */
+oracle oracle_open(const ascc_model *model, const double *weight);
+void oracle_close(oracle *o);
+
+/* One step of positions and velocities [fluid_count][dimension] in place. correction receives what the
+ * network moved each particle by, or is NULL. */
+void oracle_step(oracle *o, double *position, double *velocity, double *correction);
+
+typedef struct oracle_sequence {
+    size_t frame_count;
+    const float *position; /* [frame][fluid][dimension]; walls are the oracle's */
+} oracle_sequence;
+
+typedef struct oracle_loss_options {
+    double neighbor_weight, density_weight, wall_weight;
+} oracle_loss_options;
+
+/* The loss of docs/training.md: `presteps` steps from a frame, then `horizon` that count. */
+double oracle_loss(oracle *o, const oracle_sequence *sequence, const oracle_loss_options *options,
+                   size_t frame, int presteps, int horizon);
+
+#endif
