@@ -1,6 +1,8 @@
 /* Brute force, in doubles. SPDX-License-Identifier: MIT */
 #include "oracle.h"
 
+#include "safetensors.h"
+
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -749,6 +751,47 @@ oracle oracle_open(const ascc_model *model, const double *weight)
     oracle o = {.model = model, .weight = weight, .half_axis = -1};
     memcpy(o.gravity, model->plan.gravity, sizeof o.gravity);
     return o;
+}
+
+size_t oracle_tensors(const ascc_model *model, oracle_tensor list[ORACLE_MAX_TENSORS])
+{
+    const ascc_allocator allocator = ascc_allocator_default();
+    ascc_safetensors file;
+    ascc_message message;
+    size_t offset = 0;
+    if (ascc_safetensors_open(&allocator, model->bytes, model->byte_count, &file, &message) !=
+            ASCC_OK ||
+        file.tensor_count > ORACLE_MAX_TENSORS)
+        abort();
+    const size_t count = file.tensor_count;
+    for (size_t i = 0; i < count; i++) {
+        if (strlen(file.tensor[i].name) >= sizeof list->name)
+            abort();
+        memcpy(list[i].name, file.tensor[i].name, strlen(file.tensor[i].name) + 1);
+        list[i].offset = offset;
+        list[i].count = file.tensor[i].count;
+        offset += (list[i].count + 15) / 16 * 16; /* tensors begin on lines of the cache */
+    }
+    ascc_safetensors_close(&file);
+    return count;
+}
+
+void oracle_set_half(oracle *o, const char *half_axis)
+{
+    oracle_tensor list[ORACLE_MAX_TENSORS];
+    const size_t count = oracle_tensors(o->model, list);
+    o->half_axis = half_axis ? half_axis[0] - 'x' : -1;
+    for (size_t i = 0; half_axis && i < count; i++)
+        if (strcmp(list[i].name, "output.kernel") == 0)
+            o->half = list[i].offset;
+}
+
+double *oracle_weights(const ascc_model *model)
+{
+    double *weight = take(model->weight_count, sizeof *weight);
+    for (size_t i = 0; i < model->weight_count; i++)
+        weight[i] = (double)model->weights[i];
+    return weight;
 }
 
 void oracle_close(oracle *o)

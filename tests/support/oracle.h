@@ -44,6 +44,18 @@ void oracle_close(oracle *o);
  * network moved each particle by, or is NULL. */
 void oracle_step(oracle *o, double *position, double *velocity, double *correction);
 
+/* Tensors of the model's file in the order of its data, and where they lie in the block of weights. */
+typedef struct oracle_tensor {
+    char name[64];
+    size_t offset, count;
+} oracle_tensor;
+#define ORACLE_MAX_TENSORS 64
+size_t oracle_tensors(const ascc_model *model, oracle_tensor list[ORACLE_MAX_TENSORS]);
+/* For a last kernel "output.kernel" stored as a half along "x", "y" or "z"; NULL = whole. */
+void oracle_set_half(oracle *o, const char *half_axis);
+/* The block of weights as doubles; the caller's to free. */
+double *oracle_weights(const ascc_model *model);
+
 typedef struct oracle_sequence {
     size_t frame_count;
     const float *position; /* [frame][fluid][dimension]; walls are the oracle's */
