@@ -1,0 +1,699 @@
+/* The trainer's gradients against central differences of the oracle, and what it promises besides.
+ * SPDX-License-Identifier: MIT */
+#include <ascc/train.h>
+#include <math.h>
+#include <unistd.h>
+
+#include "support/model_builder.h"
+#include "support/oracle.h"
+#include "support/tools.h"
+
+#define SPACING 0.05
+#define TIME_STEP 0.005 /* of model_builder_random */
+#define FRAMES 8
+#define MAX_POINTS 64
+
+/* ---- A sequence ---- */
+
+typedef struct motion {
+    int dimension;
+    size_t fluid_count, wall_count;
+    float position[FRAMES * MAX_POINTS * 3], wall[MAX_POINTS * 3], normal[MAX_POINTS * 3];
+    double wide_wall[MAX_POINTS * 3], wide_normal[MAX_POINTS * 3];
+    ascc_training_sequence sequence;
+} motion;
+
+/* Particles that drift and shake above a floor: nothing a network could ever learn, and no particle of a
+ * rollout ever near its true place, where a distance has no derivative. */
+static motion *make_motion(uint64_t seed, int dimension)
+{
+    motion *m = calloc(1, sizeof *m);
+    assert_non_null(m);
+    dice d = {seed * 31 + 7};
+    const size_t n = (size_t)dimension, side = n == 2 ? 5 : 3, across = n == 2 ? 8 : 4;
+    m->dimension = dimension;
+    m->fluid_count = n == 2 ? 20 : 27;
+    m->wall_count = n == 2 ? 8 : 16;
+    for (size_t i = 0; i < m->fluid_count; i++) {
+        const size_t at[3] = {i % side, n == 2 ? i / side : i / 9, i / 3 % 3};
+        for (size_t c = 0; c < n; c++) {
+            double x = ((double)at[c] + 0.4 + dice_uniform(&d, -0.2, 0.2)) * SPACING;
+            const double v = dice_uniform(&d, -0.1, 0.1) * SPACING;
+            for (size_t t = 0; t < FRAMES; t++, x += v)
+                m->position[(t * m->fluid_count + i) * n + c] =
+                    (float)(x + dice_uniform(&d, -0.1, 0.1) * SPACING);
+        }
+    }
+    for (size_t i = 0; i < m->wall_count; i++) {
+        const double at[3] = {(double)(i % across) - 0.5, -0.3, (double)(i / across) - 0.5};
+        double length = 0.0, normal[3];
+        for (size_t c = 0; c < n; c++) {
+            m->wall[i * n + c] = (float)((at[c] + dice_uniform(&d, -0.2, 0.2)) * SPACING);
+            normal[c] = (c == 1 ? 1.0 : 0.0) + dice_uniform(&d, -0.2, 0.2);
+            length += normal[c] * normal[c];
+        }
+        for (size_t c = 0; c < n; c++) {
+            m->normal[i * n + c] = (float)(normal[c] / sqrt(length));
+            m->wide_wall[i * n + c] = (double)m->wall[i * n + c];
+            m->wide_normal[i * n + c] = (double)m->normal[i * n + c];
+        }
+    }
+    m->sequence = (ascc_training_sequence){.size = sizeof m->sequence,
+                                           .name = "shaken",
+                                           .frame_count = FRAMES,
+                                           .fluid_count = m->fluid_count,
+                                           .boundary_count = m->wall_count,
+                                           .position = m->position,
+                                           .boundary_position = m->wall,
+                                           .boundary_normal = m->normal,
+                                           .time_step = TIME_STEP,
+                                           .gravity = {0.5, -9.0, 0.25}};
+    if (dimension == 2)
+        m->sequence.gravity[2] = 0.0;
+    return m;
+}
+
+/* ---- Trainers ---- */
+
+static const ascc_training_stage only_stage = {.end = 1000, .horizon = 2, .learning_rate = 1e-3};
+
+static ascc_trainer_options default_options(void)
+{
+    return (ascc_trainer_options){.size = sizeof(ascc_trainer_options),
+                                  .seed = 3,
+                                  .batch = 3,
+                                  .stage = &only_stage,
+                                  .stage_count = 1,
+                                  .position_gradients = 1};
+}
+
+static ascc_trainer *open_trainer(const ascc_trainer_options *options, const model_random *random,
+                                  const motion *m)
+{
+    char message[256] = "";
+    ascc_trainer_options o = *options;
+    ascc_trainer *trainer = NULL;
+    size_t size;
+    unsigned char *bytes = model_builder_random(random, &size);
+    o.message = message;
+    o.message_size = sizeof message;
+    if (ascc_trainer_create(&o, bytes, size, &trainer) != ASCC_OK)
+        fail_msg("trainer: %s", message);
+    free(bytes);
+    if (m && ascc_trainer_add_sequence(trainer, &m->sequence) != ASCC_OK)
+        fail_msg("sequence: %s", ascc_trainer_message(trainer));
+    return trainer;
+}
+
+/* The parameters, from malloc. */
+static float *parameters_of(const ascc_trainer *trainer)
+{
+    float *values = malloc((ascc_trainer_parameter_count(trainer) + 1) * sizeof *values);
+    assert_non_null(values);
+    assert_int_equal(ascc_trainer_get_parameters(trainer, values), ASCC_OK);
+    return values;
+}
+
+static void iterate(ascc_trainer *trainer, int count)
+{
+    for (int i = 0; i < count; i++)
+        if (ascc_trainer_iterate(trainer, NULL) != ASCC_OK)
+            fail_msg("iterate: %s", ascc_trainer_message(trainer));
+}
+
+/* ---- Gradients ---- */
+
+typedef struct gradient_case {
+    const char *name;
+    model_random random;
+    oracle_loss_options loss;
+    int presteps, horizon;
+    int constant_positions;
+    int samples; /* of each tensor; 0 = 12 */
+} gradient_case;
+
+typedef struct bench {
+    const gradient_case *c;
+    motion *m;
+    ascc_context *context;
+    ascc_model *model;
+    double *weight, *still;
+    oracle o;
+    size_t dead; /* tensors without any gradient: rectified away */
+} bench;
+
+static void open_bench(bench *b, const gradient_case *c)
+{
+    size_t size;
+    unsigned char *bytes = model_builder_random(&c->random, &size);
+    *b = (bench){.c = c, .m = make_motion(c->random.seed, c->random.dimension)};
+    assert_int_equal(ascc_context_create(NULL, &b->context), ASCC_OK);
+    if (ascc_model_load_memory(b->context, bytes, size, &b->model) != ASCC_OK) {
+        char text[256];
+        ascc_context_message(b->context, text, sizeof text);
+        fail_msg("model: %s", text);
+    }
+    free(bytes);
+    b->weight = oracle_weights(b->model);
+    b->still = oracle_weights(b->model);
+    b->o = oracle_open(b->model, b->weight);
+    b->o.still = b->still;
+    b->o.fluid_count = b->m->fluid_count;
+    b->o.wall_count = b->m->wall_count;
+    b->o.wall = b->m->wide_wall;
+    b->o.normal = b->m->wide_normal;
+    memcpy(b->o.gravity, b->m->sequence.gravity, sizeof b->o.gravity);
+    oracle_set_half(&b->o, c->random.half_axis);
+}
+
+static void close_bench(bench *b)
+{
+    oracle_close(&b->o);
+    free(b->weight);
+    free(b->still);
+    free(b->m);
+    ascc_model_destroy(&b->model);
+    ascc_context_destroy(&b->context);
+}
+
+static double loss_of(bench *b, oracle_mode mode)
+{
+    const oracle_sequence sequence = {FRAMES, b->m->position};
+    b->o.mode = mode;
+    return oracle_loss(&b->o, &sequence, &b->c->loss, 2, b->c->presteps, b->c->horizon);
+}
+
+/* Central difference of the loss by one weight. */
+static double slope_of(bench *b, size_t at, double step)
+{
+    const oracle_mode mode = b->c->constant_positions ? ORACLE_POSITIONS : ORACLE_LATTICES;
+    const double weight = b->weight[at];
+    b->weight[at] = weight + step;
+    const double above = loss_of(b, mode);
+    b->weight[at] = weight - step;
+    const double below = loss_of(b, mode);
+    b->weight[at] = weight;
+    return (above - below) / (2.0 * step);
+}
+
+#define GRADIENT_BOUND 1e-5
+
+/* One tensor; returns the largest difference relative to its largest gradient. A step over a kink (a ReLU,
+ * a cell of a kernel) spoils a difference: then a shorter step has to agree. */
+static double check_tensor(bench *b, const oracle_tensor *tensor, const float *gradient)
+{
+    const size_t samples = b->c->samples ? (size_t)b->c->samples : 12;
+    const size_t stride = tensor->count > samples ? tensor->count / samples : 1;
+    double largest = 0.0, worst = 0.0;
+    for (size_t i = 0; i < tensor->count; i++)
+        largest = fmax(largest, fabs((double)gradient[i]));
+    b->dead += !(largest > 0.0);
+    for (size_t i = 0; i < tensor->count; i += stride) {
+        double best = INFINITY, got = (double)gradient[i], want = 0.0;
+        for (double step = 1e-5; step > 5e-9 && !(best < GRADIENT_BOUND); step *= 0.1) {
+            const double slope = slope_of(b, tensor->offset + i, step);
+            const double error =
+                slope == got ? 0.0 : fabs(slope - got) / fmax(largest, fabs(slope));
+            if (error < best) {
+                best = error;
+                want = slope;
+            }
+        }
+        if (!(best < GRADIENT_BOUND))
+            print_error("%s: %s[%zu]: %.9g, not %.9g; largest %.3g\n", b->c->name, tensor->name, i,
+                        got, want, largest);
+        worst = fmax(worst, best);
+    }
+    return worst;
+}
+
+static double check_gradient(const gradient_case *c)
+{
+    bench b;
+    open_bench(&b, c);
+    ascc_trainer_options options = default_options();
+    options.position_gradients = !c->constant_positions;
+    options.neighbor_weight = c->loss.neighbor_weight;
+    options.density_weight = c->loss.density_weight;
+    options.wall_weight = c->loss.wall_weight;
+    ascc_trainer *trainer = open_trainer(&options, &c->random, b.m);
+    const size_t count = ascc_trainer_parameter_count(trainer);
+    float *gradient = calloc(count + 1, sizeof *gradient), *values = parameters_of(trainer);
+    double loss = 0.0, alone = 0.0, worst = 0.0;
+    assert_non_null(gradient);
+    if (ascc_trainer_gradient(trainer, 0, 2, c->presteps, c->horizon, &loss, gradient) != ASCC_OK)
+        fail_msg("%s: %s", c->name, ascc_trainer_message(trainer));
+    assert_int_equal(ascc_trainer_gradient(trainer, 0, 2, c->presteps, c->horizon, &alone, NULL),
+                     ASCC_OK);
+    assert_true(loss == alone);
+    const double want = loss_of(&b, ORACLE_RECORD);
+    if (!(fabs(loss - want) < 1e-5 * want))
+        fail_msg("%s: loss %.9g, not %.9g", c->name, loss, want);
+
+    oracle_tensor list[ORACLE_MAX_TENSORS];
+    const size_t tensors = oracle_tensors(b.model, list);
+    size_t at = 0;
+    for (size_t t = 0; t < tensors; at += list[t++].count) {
+        for (size_t i = 0; i < list[t].count; i++)
+            assert_true((double)values[at + i] == b.weight[list[t].offset + i]);
+        worst = fmax(worst, check_tensor(&b, &list[t], gradient + at));
+    }
+    assert_int_equal(at, count);
+    assert_true(4 * b.dead < tensors);
+    if (!(worst < GRADIENT_BOUND))
+        fail_msg("%s: a gradient is off by %.3g of its tensor's largest", c->name, worst);
+    free(values);
+    free(gradient);
+    ascc_trainer_destroy(&trainer);
+    close_bench(&b);
+    return worst;
+}
+
+/* A small network, one layer after the first. Each case sets its scale so that corrections are some tenths
+ * of a spacing: a second step then depends on where the first one led. */
+static model_random small(uint64_t seed, int dimension)
+{
+    return (model_random){.seed = seed,
+                          .dimension = dimension,
+                          .spacing = SPACING,
+                          .channels = 8,
+                          .trunk_layers = 1,
+                          .cells = 3,
+                          .output_cells = 4,
+                          .gain = 3.0,
+                          .scale = 0.2};
+}
+
+static model_random small_basis(uint64_t seed, int dimension)
+{
+    model_random r = small(seed, dimension);
+    r.bumps = 2;
+    r.order = 1;
+    r.gain = 1.0;
+    r.scale = dimension == 2 ? 0.05 : 0.015;
+    return r;
+}
+
+static void gradients_of_grids_are_right(void **state)
+{
+    (void)state;
+    static const char *const windows[] = {"poly6", "peak", "none"};
+    static const char *const mappings[] = {"volume", "radial", "identity"};
+    double worst = 0.0;
+    for (int v = 0; v < 12; v++) {
+        gradient_case c = {.name = "grid", .random = small(1000 + (uint64_t)v, 2 + v % 2)};
+        c.random.window = windows[v / 2 % 3];
+        c.random.mapping = mappings[v / 4 % 3];
+        c.random.projection = v % 4 < 2 ? "radial" : "none";
+        c.random.half_axis = v % 3 == 0 ? NULL : v % 3 == 1 ? "x" : "y";
+        c.random.skip_self = v / 3 % 2;
+        c.random.evaluate = v % 5 == 0 ? "advected_mean" : v % 5 < 3 ? "advected" : "current";
+        c.horizon = 1 + v / 3 % 2;
+        worst = fmax(worst, check_gradient(&c));
+    }
+    print_message("grids: %.2g\n", worst);
+}
+
+static void gradients_of_plain_outputs_are_right(void **state)
+{
+    (void)state;
+    double worst = 0.0;
+    for (int v = 0; v < 6; v++) {
+        gradient_case c = {.name = "plain", .random = small(1100 + (uint64_t)v, 2 + v % 2)};
+        if (v / 2 % 2)
+            c.random = small_basis(1100 + (uint64_t)v, 2 + v % 2);
+        c.random.plain = 1;
+        c.random.fluid_only = v / 3;
+        c.horizon = 2;
+        worst = fmax(worst, check_gradient(&c));
+    }
+    print_message("plain: %.2g\n", worst);
+}
+
+static void gradients_of_bases_are_right(void **state)
+{
+    (void)state;
+    double worst = 0.0;
+    for (int v = 0; v < 12; v++) {
+        gradient_case c = {.name = "basis", .random = small_basis(1200 + (uint64_t)v, 2 + v % 2)};
+        c.random.bumps = 1 + v / 2 % 4;
+        c.random.order = v / 2 % 3;
+        c.random.fluid_only = v / 6;
+        c.random.evaluate = v % 3 ? "advected" : "current";
+        c.horizon = 1 + v / 4 % 2;
+        worst = fmax(worst, check_gradient(&c));
+    }
+    print_message("bases: %.2g\n", worst);
+}
+
+static void gradients_of_levels_are_right(void **state)
+{
+    (void)state;
+    static const char *const methods[] = {"voxel_corners", "voxel_centers", "farthest"};
+    double worst = 0.0;
+    for (int v = 0; v < 12; v++) {
+        const uint64_t seed = 1300 + (uint64_t)v;
+        gradient_case c = {.name = "levels",
+                           .random = v % 4 == 3 ? small(seed, 3) : small_basis(seed, 2 + v % 2)};
+        const int method = v / 2 % 3;
+        c.random.levels = 2 + v / 6;
+        c.random.trunk_layers = 2 + v / 6;
+        c.random.method = methods[method];
+        c.random.no_hysteresis = v / 3 % 2;
+        c.random.transfer = method == 2 ? 0 : 1 + v / 6;
+        c.random.skip_self = method == 2; /* else a kernel's centre, where it has no slope */
+        c.horizon = 1 + v / 4 % 2;
+        c.samples = 5;
+        worst = fmax(worst, check_gradient(&c));
+    }
+    print_message("levels: %.2g\n", worst);
+}
+
+static void gradients_of_motion_and_damping_are_right(void **state)
+{
+    (void)state;
+    double worst = 0.0;
+    for (int v = 0; v < 16; v++) {
+        gradient_case c = {.name = "motion", .random = small_basis(1400 + (uint64_t)v, 2 + v % 2)};
+        c.random.fluid_only = 1;
+        c.random.motion = 1 + v / 2 % 2;
+        c.random.relative = v / 4 % 2;
+        c.random.damping = v / 2 % 2;
+        c.random.walls = v / 8 % 2;
+        c.random.direction = v / 3 % 2;
+        c.random.evaluate = v % 5 ? "advected" : "current";
+        c.horizon = 1 + v / 3 % 2;
+        worst = fmax(worst, check_gradient(&c));
+    }
+    print_message("motion: %.2g\n", worst);
+}
+
+/* Everything at once. */
+static model_random everything(uint64_t seed, int dimension)
+{
+    model_random r = small_basis(seed, dimension);
+    r.fluid_only = r.relative = r.damping = r.walls = r.direction = r.transfer = 1;
+    r.bumps = 3;
+    r.motion = 2;
+    r.levels = 2;
+    r.trunk_layers = 2;
+    r.method = "voxel_corners";
+    r.no_hysteresis = 1;
+    r.evaluate = "advected";
+    return r;
+}
+
+static void gradients_of_rollouts_are_right(void **state)
+{
+    (void)state;
+    double worst = 0.0;
+    for (int v = 0; v < 8; v++) {
+        gradient_case c = {.name = "rollout",
+                           .random = everything(1500 + (uint64_t)v, 2 + v % 2),
+                           .presteps = v / 4,
+                           .horizon = 2 + v / 6,
+                           .constant_positions = v / 2 % 2,
+                           .samples = 24};
+        worst = fmax(worst, check_gradient(&c));
+    }
+    print_message("rollouts: %.2g\n", worst);
+}
+
+static void gradients_with_positions_as_constants_are_right(void **state)
+{
+    (void)state;
+    double worst = 0.0;
+    for (int v = 0; v < 4; v++) {
+        gradient_case c = {.name = "constant positions",
+                           .random = v / 2 ? small_basis(1600 + (uint64_t)v, 2 + v % 2)
+                                           : small(1600 + (uint64_t)v, 2 + v % 2),
+                           .horizon = 3,
+                           .constant_positions = 1};
+        c.random.evaluate = "advected";
+        worst = fmax(worst, check_gradient(&c));
+    }
+    print_message("constant positions: %.2g\n", worst);
+}
+
+static void gradients_of_penalties_are_right(void **state)
+{
+    (void)state;
+    double worst = 0.0;
+    for (int v = 0; v < 6; v++) {
+        gradient_case c = {.name = "penalties",
+                           .random = everything(1700 + (uint64_t)v, 2 + v % 2),
+                           .loss = {v % 3 == 0 ? 0.5 : v % 3 == 1 ? -1.0 : 0.0, v % 2 ? 3.0 : 0.0,
+                                    v % 3 ? 2.0 : 0.0},
+                           .horizon = 2};
+        c.random.scale *= 2.0;
+        worst = fmax(worst, check_gradient(&c));
+    }
+    print_message("penalties: %.2g\n", worst);
+}
+
+/* ---- Promises ---- */
+
+static ascc_trainer_options augmented(int32_t threads)
+{
+    static const ascc_training_stage stages[2] = {
+        {.end = 3, .horizon = 1, .learning_rate = 1e-3, .learning_rate_end = 5e-4},
+        {.end = 1000, .horizon = 2, .presteps = 2, .learning_rate = 5e-4}};
+    ascc_trainer_options o = default_options();
+    o.thread_count = threads;
+    o.stage = stages;
+    o.stage_count = 2;
+    o.batch = 4;
+    o.average = 0.9;
+    o.jitter = 0.02;
+    o.rotate = 1;
+    o.mirror = 1;
+    o.density_weight = 0.1;
+    o.wall_weight = 0.1;
+    return o;
+}
+
+static void assert_same_models(ascc_trainer *a, ascc_trainer *b)
+{
+    for (int32_t averaged = 0; averaged < 2; averaged++) {
+        size_t size, other;
+        const void *x = ascc_trainer_model(a, averaged, &size);
+        const void *y = ascc_trainer_model(b, averaged, &other);
+        assert_non_null(x);
+        assert_non_null(y);
+        assert_int_equal(size, other);
+        assert_memory_equal(x, y, size);
+    }
+}
+
+static void same_seed_gives_the_same_weights_for_any_threads(void **state)
+{
+    (void)state;
+    for (int v = 0; v < 2; v++) {
+        const model_random random = everything(21, 2 + v);
+        motion *m = make_motion(5, 2 + v);
+        ascc_trainer_options one = augmented(1), two = augmented(2), other = augmented(1);
+        other.seed++;
+        two.memory_limit = (size_t)v; /* and for any memory */
+        ascc_trainer *a = open_trainer(&one, &random, m), *b = open_trainer(&two, &random, m);
+        ascc_trainer *c = open_trainer(&other, &random, m);
+        float *before = parameters_of(a);
+        iterate(a, 5);
+        iterate(b, 5);
+        iterate(c, 5);
+        assert_same_models(a, b);
+        const size_t size = ascc_trainer_parameter_count(a) * sizeof(float);
+        float *after = parameters_of(a), *differ = parameters_of(c);
+        assert_memory_not_equal(before, after, size);
+        assert_memory_not_equal(differ, after, size);
+        free(before);
+        free(after);
+        free(differ);
+        ascc_trainer_destroy(&a);
+        ascc_trainer_destroy(&b);
+        ascc_trainer_destroy(&c);
+        free(m);
+    }
+}
+
+static void going_on_from_a_saved_state_gives_the_same_bits(void **state)
+{
+    (void)state;
+    char path[] = "/tmp/ascc-train-XXXXXX";
+    const int file = mkstemp(path);
+    assert_true(file >= 0);
+    const model_random random = everything(22, 2), another = small(22, 2);
+    motion *m = make_motion(6, 2);
+    const ascc_trainer_options o = augmented(2);
+    ascc_trainer *a = open_trainer(&o, &random, m), *b = open_trainer(&o, &random, m);
+    ascc_trainer *c = open_trainer(&o, &another, m);
+    iterate(a, 3);
+    assert_int_equal(ascc_trainer_save(a, path), ASCC_OK);
+    iterate(a, 3);
+    assert_int_equal(ascc_trainer_load(b, path), ASCC_OK);
+    assert_int_equal(ascc_trainer_iteration(b), 3);
+    iterate(b, 3);
+    assert_same_models(a, b);
+    assert_int_equal(ascc_trainer_load(c, path), ASCC_ERROR_MISMATCH);
+    assert_int_equal(ascc_trainer_iteration(c), 0);
+    assert_int_equal(ascc_trainer_load(c, "/nowhere/at/all"), ASCC_ERROR_FILE);
+    assert_int_equal(ascc_trainer_save(c, "/nowhere/at/all"), ASCC_ERROR_FILE);
+    assert_int_equal(ftruncate(file, 100), 0);
+    assert_int_equal(ascc_trainer_load(c, path), ASCC_ERROR_FORMAT);
+    assert_int_equal(remove(path), 0);
+    (void)close(file);
+    ascc_trainer_destroy(&a);
+    ascc_trainer_destroy(&b);
+    ascc_trainer_destroy(&c);
+    free(m);
+}
+
+static void a_sequence_with_a_nan_is_refused_by_name(void **state)
+{
+    (void)state;
+    const model_random random = small(23, 2);
+    const ascc_trainer_options o = default_options();
+    motion *m = make_motion(7, 2);
+    ascc_trainer *trainer = open_trainer(&o, &random, NULL);
+    m->position[(3 * m->fluid_count + 4) * 2] = NAN;
+    assert_int_equal(ascc_trainer_add_sequence(trainer, &m->sequence), ASCC_ERROR_NOT_FINITE);
+    assert_non_null(strstr(ascc_trainer_message(trainer), "shaken"));
+    assert_non_null(strstr(ascc_trainer_message(trainer), "frame 3"));
+    m->position[(3 * m->fluid_count + 4) * 2] = 0.01f;
+    m->wall[3] = INFINITY;
+    assert_int_equal(ascc_trainer_add_sequence(trainer, &m->sequence), ASCC_ERROR_NOT_FINITE);
+    assert_non_null(strstr(ascc_trainer_message(trainer), "shaken"));
+    assert_int_equal(ascc_trainer_iterate(trainer, NULL), ASCC_ERROR_ARGUMENT); /* none was added */
+    ascc_trainer_destroy(&trainer);
+    free(m);
+}
+
+static void a_sequence_of_another_time_step_or_too_short_is_refused(void **state)
+{
+    (void)state;
+    const model_random random = small(24, 2);
+    const ascc_trainer_options o = default_options();
+    motion *m = make_motion(8, 2);
+    ascc_trainer *trainer = open_trainer(&o, &random, NULL);
+    m->sequence.time_step = 1.001 * TIME_STEP;
+    assert_int_equal(ascc_trainer_add_sequence(trainer, &m->sequence), ASCC_ERROR_MISMATCH);
+    m->sequence.time_step = TIME_STEP;
+    m->sequence.frame_count = 3; /* one before the start, the start, one after: horizon 2 needs more */
+    (void)ascc_trainer_add_sequence(trainer, &m->sequence);
+    assert_int_equal(ascc_trainer_iterate(trainer, NULL), ASCC_ERROR_ARGUMENT);
+    ascc_trainer_destroy(&trainer);
+    free(m);
+}
+
+static void a_rollout_that_blows_up_leaves_the_weights_alone(void **state)
+{
+    (void)state;
+    static const float sizes[] = {1e12f, 1e30f, 3e38f};
+    for (int v = 0; v < 6; v++) {
+        const model_random random = v / 3 ? everything(25, 2) : small(25, 2);
+        const ascc_trainer_options o = default_options();
+        motion *m = make_motion(9, 2);
+        ascc_trainer *trainer = open_trainer(&o, &random, m);
+        float *good = parameters_of(trainer);
+        const size_t count = ascc_trainer_parameter_count(trainer);
+        float *values = malloc(count * sizeof *values);
+        assert_non_null(values);
+        for (size_t i = 0; i < count; i++)
+            values[i] = good[i] * (good[i] < 1.0f && good[i] > -1.0f ? sizes[v % 3] : 1.0f);
+        assert_int_equal(ascc_trainer_set_parameters(trainer, values), ASCC_OK);
+        ascc_training_report report = {.size = sizeof report};
+        const ascc_status status = ascc_trainer_iterate(trainer, &report);
+        assert_true(status != ASCC_OK || report.skipped == o.batch);
+        assert_true(status == ASCC_OK || strstr(ascc_trainer_message(trainer), "shaken"));
+        float *after = parameters_of(trainer);
+        assert_memory_equal(values, after, count * sizeof *values);
+        /* and training goes on with better ones as if nothing had been */
+        assert_int_equal(ascc_trainer_set_parameters(trainer, good), ASCC_OK);
+        iterate(trainer, 1);
+        free(after);
+        after = parameters_of(trainer);
+        for (size_t i = 0; i < count; i++)
+            assert_true(isfinite(after[i]));
+        assert_memory_not_equal(good, after, count * sizeof *good);
+        free(after);
+        free(values);
+        free(good);
+        ascc_trainer_destroy(&trainer);
+        free(m);
+    }
+}
+
+static void training_lowers_the_loss(void **state)
+{
+    (void)state;
+    const model_random random = everything(26, 2);
+    ascc_trainer_options o = default_options();
+    ascc_training_stage stage = {.end = 1000, .horizon = 2, .learning_rate = 1e-2};
+    o.stage = &stage;
+    motion *m = make_motion(10, 2);
+    for (size_t t = 1; t < FRAMES; t++) /* it rests: weights may learn to hold it against gravity */
+        memcpy(m->position + t * m->fluid_count * 2, m->position,
+               m->fluid_count * 2 * sizeof *m->position);
+    ascc_trainer *trainer = open_trainer(&o, &random, m);
+    double before, after;
+    assert_int_equal(ascc_trainer_gradient(trainer, 0, 1, 0, 2, &before, NULL), ASCC_OK);
+    iterate(trainer, 60);
+    assert_int_equal(ascc_trainer_gradient(trainer, 0, 1, 0, 2, &after, NULL), ASCC_OK);
+    print_message("loss: %.4g before, %.4g after\n", before, after);
+    assert_true(after < 0.7 * before);
+    ascc_trainer_destroy(&trainer);
+    free(m);
+}
+
+static void the_model_that_comes_out_has_the_weights(void **state)
+{
+    (void)state;
+    const model_random random = everything(27, 3);
+    const ascc_trainer_options o = default_options();
+    motion *m = make_motion(11, 3);
+    ascc_trainer *trainer = open_trainer(&o, &random, m);
+    iterate(trainer, 2);
+    float *values = parameters_of(trainer);
+    size_t size, at = 0;
+    const void *bytes = ascc_trainer_model(trainer, 0, &size);
+    assert_non_null(bytes);
+    ascc_context *context = NULL;
+    ascc_model *model = NULL;
+    assert_int_equal(ascc_context_create(NULL, &context), ASCC_OK);
+    assert_int_equal(ascc_model_load_memory(context, bytes, size, &model), ASCC_OK);
+    oracle_tensor list[ORACLE_MAX_TENSORS];
+    const size_t tensors = oracle_tensors(model, list);
+    for (size_t t = 0; t < tensors; at += list[t++].count) {
+        assert_memory_equal(model->weights + list[t].offset, values + at,
+                            list[t].count * sizeof(float));
+        for (size_t i = 0; strstr(list[t].name, "damping") && i < list[t].count; i++)
+            assert_true(values[at + i] >= 0.0f);
+    }
+    assert_int_equal(at, ascc_trainer_parameter_count(trainer));
+    free(values);
+    ascc_model_destroy(&model);
+    ascc_context_destroy(&context);
+    ascc_trainer_destroy(&trainer);
+    free(m);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(gradients_of_grids_are_right),
+        cmocka_unit_test(gradients_of_plain_outputs_are_right),
+        cmocka_unit_test(gradients_of_bases_are_right),
+        cmocka_unit_test(gradients_of_levels_are_right),
+        cmocka_unit_test(gradients_of_motion_and_damping_are_right),
+        cmocka_unit_test(gradients_of_rollouts_are_right),
+        cmocka_unit_test(gradients_with_positions_as_constants_are_right),
+        cmocka_unit_test(gradients_of_penalties_are_right),
+        cmocka_unit_test(same_seed_gives_the_same_weights_for_any_threads),
+        cmocka_unit_test(going_on_from_a_saved_state_gives_the_same_bits),
+        cmocka_unit_test(a_sequence_with_a_nan_is_refused_by_name),
+        cmocka_unit_test(a_sequence_of_another_time_step_or_too_short_is_refused),
+        cmocka_unit_test(a_rollout_that_blows_up_leaves_the_weights_alone),
+        cmocka_unit_test(training_lowers_the_loss),
+        cmocka_unit_test(the_model_that_comes_out_has_the_weights),
+    };
+    return cmocka_run_group_tests_name("train", tests, NULL, NULL);
+}
