@@ -23,8 +23,7 @@ static scene make_scene(uint64_t seed, int dimension)
     for (size_t i = 0; i < s.fluid_count; i++) {
         const size_t at[3] = {i % side, n == 2 ? i / side : i / 9, i / 3 % 3};
         for (size_t c = 0; c < n; c++) {
-            s.fluid[i * n + c] =
-                ((double)at[c] + 0.37 + dice_uniform(&d, -0.3, 0.3)) * SPACING;
+            s.fluid[i * n + c] = ((double)at[c] + 0.37 + dice_uniform(&d, -0.3, 0.3)) * SPACING;
             s.velocity[i * n + c] = dice_uniform(&d, -1.0, 1.0);
         }
     }
@@ -76,8 +75,8 @@ static void run_library(ascc_context *context, const ascc_model *model, const sc
     assert_int_equal(
         ascc_particles_add_fluid(particles, s->fluid_count, &position, &velocity, NULL, NULL),
         ASCC_OK);
-    assert_int_equal(
-        ascc_particles_add_boundary(particles, s->wall_count, &wall, &normal, 0, NULL), ASCC_OK);
+    assert_int_equal(ascc_particles_add_boundary(particles, s->wall_count, &wall, &normal, 0, NULL),
+                     ASCC_OK);
     assert_int_equal(ascc_step_create(context, model, NULL, &step), ASCC_OK);
     if (ascc_step_run(step, particles, NULL, 1) != ASCC_OK)
         fail_msg("step: %s", ascc_step_message(step));

@@ -442,8 +442,10 @@ static void gradients_of_penalties_are_right(void **state)
     for (int v = 0; v < 6; v++) {
         gradient_case c = {.name = "penalties",
                            .random = everything(1700 + (uint64_t)v, 2 + v % 2),
-                           .loss = {v % 3 == 0 ? 0.5 : v % 3 == 1 ? -1.0 : 0.0, v % 2 ? 3.0 : 0.0,
-                                    v % 3 ? 2.0 : 0.0},
+                           .loss = {v % 3 == 0   ? 0.5
+                                    : v % 3 == 1 ? -1.0
+                                                 : 0.0,
+                                    v % 2 ? 3.0 : 0.0, v % 3 ? 2.0 : 0.0},
                            .horizon = 2};
         c.random.scale *= 2.0;
         worst = fmax(worst, check_gradient(&c));
@@ -577,7 +579,8 @@ static void a_sequence_of_another_time_step_or_too_short_is_refused(void **state
     m->sequence.time_step = 1.001 * TIME_STEP;
     assert_int_equal(ascc_trainer_add_sequence(trainer, &m->sequence), ASCC_ERROR_MISMATCH);
     m->sequence.time_step = TIME_STEP;
-    m->sequence.frame_count = 3; /* one before the start, the start, one after: horizon 2 needs more */
+    m->sequence.frame_count =
+        3; /* one before the start, the start, one after: horizon 2 needs more */
     (void)ascc_trainer_add_sequence(trainer, &m->sequence);
     assert_int_equal(ascc_trainer_iterate(trainer, NULL), ASCC_ERROR_ARGUMENT);
     ascc_trainer_destroy(&trainer);

@@ -228,11 +228,10 @@ static oracle_record *build_sets(const oracle *o, const double *before, const do
     if (walls->count)
         memcpy(all->point + fluid->count, walls->point, walls->count * sizeof(point));
     for (int32_t l = 1; l < plan->level_count; l++)
-        r->set[ASCC_SET_LEVEL + l - 1] =
-            old ? copy_set(&old->set[ASCC_SET_LEVEL + l - 1])
-            : plan->sampling == ASCC_SAMPLING_FARTHEST
-                ? sample_farthest(plan, all, plan->level[l].ratio)
-                : sample_voxels(plan, all, plan->level[l].voxel);
+        r->set[ASCC_SET_LEVEL + l - 1] = old ? copy_set(&old->set[ASCC_SET_LEVEL + l - 1])
+                                         : plan->sampling == ASCC_SAMPLING_FARTHEST
+                                             ? sample_farthest(plan, all, plan->level[l].ratio)
+                                             : sample_voxels(plan, all, plan->level[l].voxel);
     return r;
 }
 
@@ -260,8 +259,8 @@ static void basis_factors(const ascc_filter *filter, int dimension, const double
                             root * z * x,
                             root / 2.0 * (x * x - y * y),
                             z * z - (x * x + y * y) / 2.0};
-    const int harmonics = dimension == 2 ? 2 * filter->order + 1
-                                         : (filter->order + 1) * (filter->order + 1);
+    const int harmonics =
+        dimension == 2 ? 2 * filter->order + 1 : (filter->order + 1) * (filter->order + 1);
     for (int k = 0; k < filter->bumps; k++)
         for (int m = 0; m < harmonics; m++)
             factor[k * harmonics + m] =
@@ -413,18 +412,18 @@ static void add_product(const network_state *n, const ascc_term *term, size_t ce
 {
     for (int32_t b = 0; b < term->outputs; b++)
         for (int32_t a = 0; a < term->inputs; a++)
-            out[b] += in[a] * weight_at(n->o, term->weight,
-                                        (cell * (size_t)term->inputs + (size_t)a) *
-                                                (size_t)term->outputs +
-                                            (size_t)b);
+            out[b] += in[a] *
+                      weight_at(n->o, term->weight,
+                                (cell * (size_t)term->inputs + (size_t)a) * (size_t)term->outputs +
+                                    (size_t)b);
 }
 
 static double displacement(const point *to, const point *from, double d[3])
 {
     double square = 0.0;
     for (int c = 0; c < 3; c++) {
-        d[c] = to->particle == from->particle && to->particle != NOBODY ? 0.0
-                                                                        : to->x[c] - from->x[c];
+        d[c] =
+            to->particle == from->particle && to->particle != NOBODY ? 0.0 : to->x[c] - from->x[c];
         square += d[c] * d[c];
     }
     return sqrt(square);
@@ -548,7 +547,7 @@ static void set_features(const ascc_plan *plan, const int32_t *feature, int32_t 
         else
             for (int c = 0; c < plan->dimension; c++)
                 *to++ = feature[f] != ASCC_FEATURE_MOTION ? vector[c]
-                        : wall ? 0.0
+                        : wall                            ? 0.0
                                : vector[c] * plan->time_step / plan->spacing;
 }
 
@@ -609,9 +608,9 @@ static void grid_pair(const network_state *n, const double *sum, const double d[
         for (int y = 0; y < cells[1]; y++)
             for (int x = 0; x < cells[0]; x++, cell++)
                 for (size_t k = 0; factor[cell] != 0.0 && k < inputs * d_count; k++)
-                    term[k % d_count] += factor[cell] * sum[k / d_count] *
-                                         odd_kernel(n->o, (const int[3]){x, y, z}, k,
-                                                    inputs * d_count);
+                    term[k % d_count] +=
+                        factor[cell] * sum[k / d_count] *
+                        odd_kernel(n->o, (const int[3]){x, y, z}, k, inputs * d_count);
     free(factor);
     for (size_t c = 0; c < d_count; c++) {
         term[c] *= output->scale[c];
@@ -643,7 +642,8 @@ static void central_pair(const network_state *n, const ascc_filter *filter, cons
     const double length = sqrt(seen[0] * seen[0] + seen[1] * seen[1] + seen[2] * seen[2]);
     double line[3] = {seen[0], seen[1], seen[2]}, approach = 0.0;
     for (int c = 0; plan->output.current_direction && c < 3; c++)
-        line[c] = (wall_at ? wall_at : n->sets->before + j * 3)[c] - n->sets->before[i * 3 + (size_t)c];
+        line[c] =
+            (wall_at ? wall_at : n->sets->before + j * 3)[c] - n->sets->before[i * 3 + (size_t)c];
     const double across = sqrt(line[0] * line[0] + line[1] * line[1] + line[2] * line[2]);
     if (across == 0.0 || length == 0.0)
         return;
@@ -715,9 +715,10 @@ void oracle_step(oracle *o, double *position, double *velocity, double *correcti
     double *moved = take(numbers, sizeof *moved);
     for (size_t k = 0; k < numbers; k++) {
         after[k] = velocity[k] + dt * o->gravity[k % d];
-        seen[k] = position[k] + (plan->advection == ASCC_ADVECT_NONE  ? 0.0
-                                 : plan->advection == ASCC_ADVECT_END ? dt * after[k]
-                                                                      : dt * 0.5 * (velocity[k] + after[k]));
+        seen[k] = position[k] + (plan->advection == ASCC_ADVECT_NONE ? 0.0
+                                 : plan->advection == ASCC_ADVECT_END
+                                     ? dt * after[k]
+                                     : dt * 0.5 * (velocity[k] + after[k]));
     }
     oracle_record *sets = build_sets(o, position, seen);
     network_state n = {o, sets, take((size_t)plan->layer_count + 2, sizeof(values))};
