@@ -811,13 +811,14 @@ static int ascending(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-/* Between the two nearest ranks, as numpy.percentile. Sorts the values. */
-static double percentile(double *value, size_t count, double share)
+/* The value of that rank, read as the middle of its bin. Sorts the values. */
+static double percentile(double *value, size_t count, double share, double bin)
 {
+    size_t rank = 0; /* of the first value that no less than the share is at or below */
     qsort(value, count, sizeof *value, ascending);
-    const double at = share * (double)(count - 1);
-    const size_t low = (size_t)floor(at), high = low + 1 < count ? low + 1 : low;
-    return value[low] + (at - (double)low) * (value[high] - value[low]);
+    while (rank + 1 < count && (double)(rank + 1) < share * (double)count)
+        rank++;
+    return (floor(value[rank] / bin) + 0.5) * bin;
 }
 
 static double distance(const double *a, const double *b, size_t d)
@@ -863,28 +864,6 @@ static void true_frame(const oracle *o, const oracle_sequence *sequence, size_t 
         x[k] = (double)sequence->position[frame * numbers + k];
 }
 
-/* rho_95 and s_05 of a sequence. */
-static void references_of(const oracle *o, const oracle_sequence *sequence, double *rho,
-                          double *clear)
-{
-    const size_t d = (size_t)o->model->plan.dimension, n = o->fluid_count;
-    double *all = take(sequence->frame_count * n, sizeof *all), *x = take(n * d, sizeof *x);
-    double *near = take(sequence->frame_count * n, sizeof *near);
-    size_t count = 0;
-    for (size_t t = 0; t < sequence->frame_count; t++) {
-        true_frame(o, sequence, t, x);
-        for (size_t i = 0; i < n; i++) {
-            all[t * n + i] = density_of(o, x, i);
-            count += clearance(o, x + i * d, o->model->plan.spacing, &near[count]);
-        }
-    }
-    *rho = percentile(all, sequence->frame_count * n, 0.95);
-    *clear = count ? percentile(near, count, 0.05) : -INFINITY;
-    free(near);
-    free(x);
-    free(all);
-}
-
 /* Within which radius the last layer sees: ascc_model_info says the same. */
 static double support_radius(const ascc_plan *plan)
 {
@@ -898,41 +877,69 @@ static double support_radius(const ascc_plan *plan)
     return radius;
 }
 
-static double frame_loss(const oracle *o, const double *x, const double *y,
-                         const oracle_loss_options *options, double rho, double clear)
+static double neighbors_of(const oracle *o, const double *x, size_t i)
+{
+    const size_t d = (size_t)o->model->plan.dimension;
+    double count = 0.0;
+    for (size_t j = 0; j < o->fluid_count; j++)
+        count += j != i && distance(x + i * d, x + j * d, d) <= support_radius(&o->model->plan);
+    return count;
+}
+
+oracle_references oracle_measure(const oracle *o, const oracle_sequence *sequence)
 {
     const size_t d = (size_t)o->model->plan.dimension, n = o->fluid_count;
-    const double h = o->model->plan.spacing, radius = support_radius(&o->model->plan);
+    const size_t rows = sequence->frame_count * n;
+    double *all = take(rows, sizeof *all), *x = take(n * d, sizeof *x);
+    double *near = take(rows, sizeof *near), spacing = o->model->plan.spacing;
+    size_t count = 0;
+    oracle_references r = {0.0, 0.0, -INFINITY};
+    for (size_t t = 0; t < sequence->frame_count; t++) {
+        true_frame(o, sequence, t, x);
+        for (size_t i = 0; i < n; i++) {
+            all[t * n + i] = density_of(o, x, i);
+            count += clearance(o, x + i * d, spacing, &near[count]);
+            r.neighbors += neighbors_of(o, x, i) / (double)rows;
+        }
+    }
+    r.density = percentile(all, rows, 0.95, 1.0 / 64.0);
+    if (count)
+        r.clearance = percentile(near, count, 0.05, spacing / 2048.0);
+    free(near);
+    free(x);
+    free(all);
+    return r;
+}
+
+static double frame_loss(const oracle *o, const double *x, const double *y,
+                         const oracle_loss_options *options, const oracle_references *r)
+{
+    const size_t d = (size_t)o->model->plan.dimension, n = o->fluid_count;
+    const double h = o->model->plan.spacing;
     const double share = options->neighbor_weight == 0.0  ? 1.0
                          : options->neighbor_weight < 0.0 ? 0.0
                                                           : options->neighbor_weight;
-    double *c = take(n, sizeof *c), mean = 0.0, sum = 0.0, weights = 0.0, penalty = 0.0;
-    for (size_t i = 0; i < n; i++) {
-        for (size_t j = 0; j < n; j++)
-            c[i] += j != i && distance(y + i * d, y + j * d, d) <= radius;
-        mean += c[i] / (double)n;
-    }
+    double sum = 0.0, weights = 0.0, penalty = 0.0;
     for (size_t i = 0; i < n; i++) {
         double s;
-        const double w = mean > 0.0 ? exp(-share * c[i] / mean) : 1.0;
+        const double w = exp(-share * neighbors_of(o, y, i) / r->neighbors);
         weights += w;
         sum += w * distance(x + i * d, y + i * d, d) / h;
         penalty += options->density_weight / (double)n *
-                   pow(fmax(0.0, density_of(o, x, i) / rho - 1.0), 2.0);
+                   pow(fmax(0.0, density_of(o, x, i) / r->density - 1.0), 2.0);
         if (clearance(o, x + i * d, 4.0 * h, &s))
-            penalty += options->wall_weight / (double)n * pow(fmax(0.0, (clear - s) / h), 2.0);
+            penalty +=
+                options->wall_weight / (double)n * pow(fmax(0.0, (r->clearance - s) / h), 2.0);
     }
-    free(c);
     return sum / weights + penalty;
 }
 
-double oracle_loss(oracle *o, const oracle_sequence *sequence, const oracle_loss_options *options,
-                   size_t frame, int presteps, int horizon)
+double oracle_loss(oracle *o, const oracle_sequence *sequence, const oracle_references *references,
+                   const oracle_loss_options *options, size_t frame, int presteps, int horizon)
 {
     const size_t numbers = o->fluid_count * (size_t)o->model->plan.dimension;
     double *x = take(numbers, sizeof *x), *v = take(numbers, sizeof *v);
-    double *y = take(numbers, sizeof *y), rho, clear, loss = 0.0;
-    references_of(o, sequence, &rho, &clear);
+    double *y = take(numbers, sizeof *y), loss = 0.0;
     true_frame(o, sequence, frame - 1, y);
     true_frame(o, sequence, frame, x);
     for (size_t k = 0; k < numbers; k++)
@@ -944,7 +951,7 @@ double oracle_loss(oracle *o, const oracle_sequence *sequence, const oracle_loss
         oracle_step(o, x, v, NULL);
         true_frame(o, sequence, frame + (size_t)t, y);
         if (t > presteps)
-            loss += frame_loss(o, x, y, options, rho, clear) / horizon;
+            loss += frame_loss(o, x, y, options, references) / horizon;
     }
     o->weight = moved;
     free(y);

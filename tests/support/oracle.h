@@ -65,8 +65,16 @@ typedef struct oracle_loss_options {
     double neighbor_weight, density_weight, wall_weight;
 } oracle_loss_options;
 
+/* What the loss compares with, over all particles and frames. */
+typedef struct oracle_references {
+    double neighbors; /* c_avg */
+    double density;   /* rho_95 */
+    double clearance; /* s_05, m; no wall anywhere near: -infinity */
+} oracle_references;
+oracle_references oracle_measure(const oracle *o, const oracle_sequence *sequence);
+
 /* The loss of docs/training.md: `presteps` steps from a frame, then `horizon` that count. */
-double oracle_loss(oracle *o, const oracle_sequence *sequence, const oracle_loss_options *options,
-                   size_t frame, int presteps, int horizon);
+double oracle_loss(oracle *o, const oracle_sequence *sequence, const oracle_references *references,
+                   const oracle_loss_options *options, size_t frame, int presteps, int horizon);
 
 #endif
