@@ -768,6 +768,87 @@ static void wrong_bases_and_transfers_are_refused_by_name(void **state)
     }
 }
 
+static void wrong_motions_dampings_and_walls_are_refused_by_name(void **state)
+{
+    (void)state;
+    static const char head[] =
+        "{\"name\":\"n\",\"dimension\":2,\"time_step\":0.01,\"gravity\":[0,-9.81],"
+        "\"particle_spacing\":0.05,\"rest_density\":1000,\"evaluate\":\"advected\","
+        "\"features\":{\"fluid\":[\"one\",\"motion\"],\"boundary\":[\"motion\",\"normal\"]},"
+        "\"layers\":[{\"name\":\"a\",\"points\":\"fluid\",\"channels\":2,\"terms\":["
+        "{\"type\":\"convolution\",\"source\":\"fluid\",\"kernel\":\"k\",\"radius\":0.1,"
+        "\"basis\":{\"bumps\":3,\"order\":1},\"relative\":true},"
+        "{\"type\":\"convolution\",\"source\":\"boundary\",\"kernel\":\"b\",\"radius\":0.1,"
+        "\"basis\":{\"bumps\":2,\"order\":0},\"relative\":true}]}],"
+        "\"output\":{\"type\":\"antisymmetric\",\"source\":\"a\",\"relu\":true,\"kernel\":\"o\","
+        "\"radius\":0.1,\"basis\":{\"bumps\":4},\"scale\":0.01,\"direction\":\"current\","
+        "\"damping\":\"d\",\"walls\":{\"kernel\":\"wk\",\"damping\":\"wd\",\"radius\":0.12,"
+        "\"basis\":{\"bumps\":5}}}}";
+    static const struct {
+        const char *from, *to, *hint;
+    } cases[] = {
+        {"[\"one\",\"motion\"]", "[\"one\",\"velocity\"]", "motion"},
+        {"[\"motion\",\"normal\"]", "[\"one\",\"one\"]", "twice"},
+        {"[\"motion\",\"normal\"]", "[\"normal\",\"normal\"]", "twice"},
+        {"\"motion\",\"normal\"", "\"motion\",\"velocity\"", "boundary"},
+        {"\"points\":\"fluid\"", "\"points\":\"all\"", "'relative'"},
+        {"\"relative\":true", "\"relative\":1", "'relative'"},
+        {"\"relative\":true", "\"relativ\":true", "'relativ'"},
+        {"\"direction\":\"current\"", "\"direction\":\"advected\"", "'direction'"},
+        {"\"relu\":true,", "", "'relu'"},
+        {"\"damping\":\"d\"", "\"damping\":\"gone\"", "'gone'"},
+        {"\"damping\":\"d\"", "\"damping\":\"wd\"", "[5, 2], but must have [4, 2]"},
+        {"\"damping\":\"d\"", "\"damping\":\"negative\"", "'negative'"},
+        {"\"damping\":\"d\",", "", "'d' is not used"},
+        {"\"damping\":\"wd\",", "", "'wd' is not used"},
+        {"\"kernel\":\"wk\",", "", "'kernel'"},
+        {"\"kernel\":\"wk\"", "\"kernel\":\"o\"", "[4, 2], but must have [5, 2]"},
+        {"\"radius\":0.12,", "", "'radius'"},
+        {"\"radius\":0.12", "\"radius\":0", "'radius'"},
+        {"\"bumps\":5", "\"bumps\":9", "'bumps'"},
+        {"\"bumps\":5", "\"bumps\":5,\"order\":1", "'order'"},
+        {"\"radius\":0.12,\"basis\":{\"bumps\":5}",
+         "\"radius\":0.12,\"window\":\"peak\",\"mapping\":\"volume\"", "basis"},
+        {"\"radius\":0.12", "\"radius\":0.12,\"scale\":1", "'scale'"},
+        {"{\"kernel\":\"wk\",\"damping\":\"wd\",\"radius\":0.12,\"basis\":{\"bumps\":5}}", "true",
+         "'walls'"},
+        {"\"name\":\"n\"", "\"name\":\"m\"", NULL},
+    };
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        size_t size;
+        char *network = replaced(head, cases[i].from, cases[i].to);
+        const int negative = strstr(network, "negative") != NULL;
+        float damping[8] = {0.0f, 0.5f, 1.0f, 0.0f, 0.0f, 2.0f, 0.0f, negative ? -1e-9f : 0.0f};
+        model_builder builder;
+        model_builder_open(&builder);
+        model_builder_metadata(&builder, "format", "ascc.model");
+        model_builder_metadata(&builder, "version", "1");
+        model_builder_metadata(&builder, "network", network);
+        add_tensor(&builder, "k", 4, (const size_t[]){3, 3, 3, 2}, 0);
+        add_tensor(&builder, "b", 4, (const size_t[]){2, 1, 4, 2}, 0);
+        add_tensor(&builder, "o", 2, (const size_t[]){4, 2}, 0);
+        model_builder_tensor(&builder, negative ? "negative" : "d", 2, (const size_t[]){4, 2},
+                             damping);
+        add_tensor(&builder, "wk", 2, (const size_t[]){5, 2}, 0);
+        add_tensor(&builder, "wd", 2, (const size_t[]){5, 2}, 0);
+        unsigned char *bytes = model_builder_finish(&builder, &size);
+        free(network);
+        if (cases[i].hint) {
+            must_refuse(cases[i].to, bytes, size, cases[i].hint);
+            continue;
+        }
+        ascc_model *model = must_load(bytes, size); /* the last: it was right */
+        const ascc_output *output = &model->plan.output;
+        must_have(model, output->damping, 8);
+        must_have(model, output->walls.weight, 10);
+        must_have(model, output->walls.damping, 10);
+        assert_true(output->damping[5] == 2.0f && output->walls.damping[9] == 10.0f);
+        assert_true(output->walls.present && output->current_direction);
+        assert_true(model->plan.term[0].relative && model->plan.term[1].relative);
+        ascc_model_destroy(&model);
+    }
+}
+
 static void layers_without_terms_are_refused(void **state)
 {
     (void)state;
@@ -1230,6 +1311,7 @@ int main(void)
         cmocka_unit_test(base_network_loads),
         cmocka_unit_test(wrong_descriptions_are_refused_by_name),
         cmocka_unit_test(wrong_bases_and_transfers_are_refused_by_name),
+        cmocka_unit_test(wrong_motions_dampings_and_walls_are_refused_by_name),
         cmocka_unit_test(layers_without_terms_are_refused),
         cmocka_unit_test(wrong_tensors_are_refused_by_name),
         cmocka_unit_test(kernels_have_a_bounded_number_of_cells),
