@@ -75,7 +75,8 @@ static motion *make_motion(uint64_t seed, int dimension)
 
 /* ---- Trainers ---- */
 
-static const ascc_training_stage only_stage = {.end = 1000, .horizon = 2, .learning_rate = 1e-3};
+static const ascc_training_stage only_stage = {
+    .end = 1000, .horizon = 3, .presteps = 1, .learning_rate = 1e-3};
 
 static ascc_trainer_options default_options(void)
 {
@@ -116,8 +117,9 @@ static float *parameters_of(const ascc_trainer *trainer)
 
 static void iterate(ascc_trainer *trainer, int count)
 {
+    ascc_training_report report = {.size = sizeof report};
     for (int i = 0; i < count; i++)
-        if (ascc_trainer_iterate(trainer, NULL) != ASCC_OK)
+        if (ascc_trainer_iterate(trainer, &report) != ASCC_OK)
             fail_msg("iterate: %s", ascc_trainer_message(trainer));
 }
 
@@ -140,7 +142,7 @@ typedef struct bench {
     double *weight, *still;
     oracle o;
     oracle_references references;
-    size_t dead; /* tensors without any gradient: rectified away */
+    int dead; /* tensors without any gradient: rectified away */
 } bench;
 
 static void open_bench(bench *b, const gradient_case *c)
@@ -262,7 +264,7 @@ static double check_gradient(const gradient_case *c)
         worst = fmax(worst, check_tensor(&b, &list[t], gradient + at));
     }
     assert_int_equal(at, count);
-    assert_true(2 * b.dead < tensors);
+    assert_true(2 * (size_t)b.dead < tensors);
     if (!(worst < GRADIENT_BOUND))
         fail_msg("%s: a gradient is off by %.3g of its tensor's largest", c->name, worst);
     free(values);
@@ -567,7 +569,8 @@ static void a_sequence_with_a_nan_is_refused_by_name(void **state)
     m->wall[3] = INFINITY;
     assert_int_equal(ascc_trainer_add_sequence(trainer, &m->sequence), ASCC_ERROR_NOT_FINITE);
     assert_non_null(strstr(ascc_trainer_message(trainer), "shaken"));
-    assert_int_equal(ascc_trainer_iterate(trainer, NULL), ASCC_ERROR_ARGUMENT); /* none was added */
+    ascc_training_report report = {.size = sizeof report}; /* none was added */
+    assert_int_equal(ascc_trainer_iterate(trainer, &report), ASCC_ERROR_ARGUMENT);
     ascc_trainer_destroy(&trainer);
     free(m);
 }
@@ -585,7 +588,8 @@ static void a_sequence_of_another_time_step_or_too_short_is_refused(void **state
     m->sequence.frame_count =
         3; /* one before the start, the start, one after: horizon 2 needs more */
     (void)ascc_trainer_add_sequence(trainer, &m->sequence);
-    assert_int_equal(ascc_trainer_iterate(trainer, NULL), ASCC_ERROR_ARGUMENT);
+    ascc_training_report report = {.size = sizeof report};
+    assert_int_equal(ascc_trainer_iterate(trainer, &report), ASCC_ERROR_ARGUMENT);
     ascc_trainer_destroy(&trainer);
     free(m);
 }

@@ -893,13 +893,12 @@ oracle_references oracle_measure(const oracle *o, const oracle_sequence *sequenc
     double *all = take(rows, sizeof *all), *x = take(n * d, sizeof *x);
     double *near = take(rows, sizeof *near), spacing = o->model->plan.spacing;
     size_t count = 0;
-    oracle_references r = {0.0, 0.0, -INFINITY};
+    oracle_references r = {0.0, -INFINITY};
     for (size_t t = 0; t < sequence->frame_count; t++) {
         true_frame(o, sequence, t, x);
         for (size_t i = 0; i < n; i++) {
             all[t * n + i] = density_of(o, x, i);
             count += clearance(o, x + i * d, spacing, &near[count]);
-            r.neighbors += neighbors_of(o, x, i) / (double)rows;
         }
     }
     r.density = percentile(all, rows, 0.95, 1.0 / 64.0);
@@ -919,10 +918,12 @@ static double frame_loss(const oracle *o, const double *x, const double *y,
     const double share = options->neighbor_weight == 0.0  ? 1.0
                          : options->neighbor_weight < 0.0 ? 0.0
                                                           : options->neighbor_weight;
-    double sum = 0.0, weights = 0.0, penalty = 0.0;
+    double sum = 0.0, weights = 0.0, penalty = 0.0, mean = 0.0;
+    for (size_t i = 0; i < n; i++)
+        mean += neighbors_of(o, y, i) / (double)n;
     for (size_t i = 0; i < n; i++) {
         double s;
-        const double w = exp(-share * neighbors_of(o, y, i) / r->neighbors);
+        const double w = mean > 0.0 ? exp(-share * neighbors_of(o, y, i) / mean) : 1.0;
         weights += w;
         sum += w * distance(x + i * d, y + i * d, d) / h;
         penalty += options->density_weight / (double)n *

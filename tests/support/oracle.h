@@ -67,7 +67,6 @@ typedef struct oracle_loss_options {
 
 /* What the loss compares with, over all particles and frames. */
 typedef struct oracle_references {
-    double neighbors; /* c_avg */
     double density;   /* rho_95 */
     double clearance; /* s_05, m; no wall anywhere near: -infinity */
 } oracle_references;
