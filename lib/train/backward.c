@@ -266,13 +266,12 @@ static void scatter_row(const ascc_passing *p, const ascc_term *term, const ascc
     const size_t own_a = ascc_padded(plan->fluid_channels);
     const int32_t from = ascc_plan_motion(plan, term->source);
     float *own = p->value[0].raw + row * own_a + ascc_plan_motion(plan, 0);
-    for (size_t k = 0; k < count; k++)
-        for (int32_t c = 0; c < plan->dimension; c++) {
-            const float g = to[k * a + (size_t)(from + c)];
-            own[c] -= g;
-            if (term->source == 0)
-                gradient[neighbor[k] * a + (size_t)(from + c)] += g;
-        }
+    for (size_t k = 0; k < count; k++) {
+        for (int32_t c = 0; c < plan->dimension; c++)
+            own[c] -= to[k * a + (size_t)(from + c)];
+        for (size_t c = 0; term->source == 0 && c < a; c++) /* other channels are as they were */
+            gradient[neighbor[k] * a + c] += to[k * a + c];
+    }
 }
 
 static void search_term(const ascc_passing *p, const ascc_term *term, const ascc_rows *rows,
