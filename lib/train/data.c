@@ -6,6 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "../plan.h"
 #include "near.h"
 
 #define BINS 4096 /* of the histograms that percentiles come from */
@@ -91,10 +92,10 @@ static ascc_status measure_fluid(ascc_kept_sequence *s, const ascc_plan *plan, s
                                  const double *x, const ascc_search_tools *tools, histogram *dense)
 {
     ascc_near near;
-    ascc_status status = ascc_near_find(&near, tools, s->dimension, plan->output.filter.radius > 0.0
-                                                                        ? plan->output.filter.radius
-                                                                        : 2.0 * plan->spacing,
-                                        x, s->fluid_count, NULL, 0);
+    const double support = ascc_plan_support_radius(plan); /* 0: the last layer has no neighbours */
+    ascc_status status =
+        ascc_near_find(&near, tools, s->dimension, support > 0.0 ? support : 2.0 * plan->spacing, x,
+                       s->fluid_count, NULL, 0);
     for (size_t i = 0; status == ASCC_OK && i < s->fluid_count; i++)
         s->near[frame * s->fluid_count + i] = (uint16_t)fmin(near.rows.count[i] - 1.0, 65535.0);
     if (status == ASCC_OK)
