@@ -13,6 +13,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 #include <time.h>
 #include <unistd.h>
 
@@ -395,8 +396,20 @@ static bool load_checkpoint(training *t)
     return true;
 }
 
+/* The folder of the output, if only that is missing. */
+static void make_folder(const char *path)
+{
+    char folder[ASCC_TRAIN_PATH];
+    const char *slash = strrchr(path, '/');
+    if (!slash || slash == path)
+        return;
+    (void)snprintf(folder, sizeof folder, "%.*s", (int)(slash - path), path);
+    (void)mkdir(folder, 0777);
+}
+
 static bool open_all(training *t)
 {
+    make_folder(t->config.output);
     char why[512];
     if (!create_trainer(t) || !load_checkpoint(t) || !add_sequences(t) || !load_truths(t))
         return false;

@@ -1,0 +1,233 @@
+#!/bin/sh
+# `ascc train` from outside: configs, interruption, going on, a full disk; prints TAP.
+# $1: a build folder. SPDX-License-Identifier: MIT
+cd "$(dirname "$0")/.." || exit 1
+source=$(pwd)
+ascc=$(cd "${1:-build}" && pwd)/examples/ascc || exit 1
+number=0
+failed=0
+folder=$(mktemp -d) || exit 1
+trap 'rm -rf "$folder"' EXIT
+cd "$folder" || exit 1
+
+report() {
+    number=$((number + 1))
+    if [ "$1" -eq 0 ]; then
+        echo "ok $number - $2"
+    else
+        echo "not ok $number - $2"
+        [ -f out ] && sed 's/^/# /' out err
+        failed=1
+    fi
+}
+
+run() { "$ascc" "$@" >out 2>err; }
+
+# refuses STATUS TEXT ARGUMENTS...: ends with that status and one line with the text on stderr.
+refuses() {
+    wanted=$1
+    text=$2
+    shift 2
+    run "$@"
+    status=$?
+    [ $status -eq "$wanted" ] && grep -qF -e "$text" err && [ ! -s out ]
+    report $? "ascc $* is refused: $text"
+}
+
+# holds NAME COMMAND...: passes when the command does.
+holds() {
+    name=$1
+    shift
+    "$@" >/dev/null 2>&1
+    report $? "$name"
+}
+
+"$ascc" generate wbc2d -o data --seed 4 --count 2 --frames 16 --spacing 0.06 >out 2>err
+report $? 'sequences to learn from are generated'
+"$ascc" info data/wbc2d_4_0000.safetensors >out 2>err
+step=$(sed -n 's/.*frames .*, \([0-9.e-]*\) s apart/\1/p' out)
+
+# config NAME OUTPUT [SED SCRIPT]: a config of 24 iterations, changed by the script.
+config() {
+    mkdir -p "$2"
+    sed -e "s/STEP/$step/" -e "s|OUTPUT|$2/m.safetensors|" >"$1" <<'END'
+{
+  "network": {
+    "name": "test", "dimension": 2, "spacing": 0.06, "time_step": STEP, "channels": 4,
+    "levels": 1, "coarse_channels": [4]
+  },
+  "data": {
+    "train": ["data/*_0000.safetensors", {"path": "data/wbc2d_4_0001.safetensors", "share": 2}],
+    "valid": ["data/wbc2d_4_0001.safetensors"]
+  },
+  "stages": [
+    {"iterations": 12, "horizon": 1, "learning_rate": 0.002, "learning_rate_end": 0.001},
+    {"iterations": 12, "horizon": 2, "presteps": 2, "learning_rate": 0.001}
+  ],
+  "batch": 2, "seed": 3, "clip": 1, "average": 0.9, "jitter": 0.01, "rotate": true, "mirror": true,
+  "density_weight": 0.1, "wall_weight": 0.1, "position_gradients": true, "memory": 0.5,
+  "output": "OUTPUT",
+  "checkpoint": {"every_seconds": 0},
+  "validate": {"every_iterations": 8, "frames": 4, "starts": 3}
+}
+END
+    [ -z "$3" ] || { sed "$3" "$1" >changed && mv changed "$1"; }
+}
+
+# ---- What a config may say ----
+
+# wrong TEXT SED SCRIPT: a config that is changed so is refused, and the text says why.
+wrong() {
+    config bad.json bad "$2"
+    refuses 1 "$1" train bad.json
+}
+refuses 2 'usage: ascc train CONFIG' train
+refuses 2 '--iterations: unknown, or not with this value' train a.json --iterations 0
+refuses 2 '--threads: unknown, or not with this value' train a.json --threads
+refuses 2 '--what: unknown, or not with this value' train a.json --what
+refuses 1 'none.json: No such file' train none.json
+holds 'help is told' sh -c '"$0" train --help | grep -q -e --resume' "$ascc"
+printf '{"network": ' >broken.json
+refuses 1 'broken.json: ' train broken.json
+wrong "config: unknown key 'bach'" 's/"batch"/"bach"/'
+wrong "network: unknown key 'chanels'" 's/"channels"/"chanels"/'
+wrong "config: 'batch' is 0" 's/"batch": 2/"batch": 0/'
+wrong "config: 'batch' must be a number" 's/"batch": 2/"batch": "2"/'
+wrong "network: 'coarse_channels' must be a list of 1" 's/"coarse_channels": .4./"coarse_channels": [4, 4]/'
+wrong "network: 'dimension' is 4" 's/"dimension": 2/"dimension": 4/'
+wrong "network: 'kernel' does not understand 'mesh'" 's/"channels": 4,/"kernel": "mesh",/'
+wrong "projection is for kernel grid" 's/"channels": 4,/"projection": "radial",/'
+wrong "either 'network' or 'model' is wanted" 's/"batch": 2/"model": "m.safetensors"/'
+wrong "stage 2: 'horizon' is 0" 's/"horizon": 2/"horizon": 0/'
+wrong "stage 1: unknown key 'rate'" 's/"learning_rate_end"/"rate"/'
+wrong "data: train: *_0009.safetensors: there is no such file" 's|data/[*]_0000|*_0009|'
+wrong "data: train: unknown key 'shared'" 's/"share"/"shared"/'
+wrong "'output' is missing" '/"output"/d'
+wrong "validate: unknown key 'frame'" 's/"frames"/"frame"/'
+wrong "nowhere/deep/m" 's|bad/m.saf|nowhere/deep/m.saf|'
+rm -rf bad bad.json
+
+# ---- From beginning to end ----
+
+config whole.json whole
+run train whole.json --threads 1
+report $? 'a network is trained'
+holds 'nothing but the result is printed when stderr is no terminal' sh -c '[ -s out ] && [ ! -s err ]'
+holds 'the model can be loaded' "$ascc" info whole/m.safetensors
+holds 'the latest model can be loaded' "$ascc" info whole/m-latest.safetensors
+holds 'the log has a row an iteration' sh -c '[ "$(wc -l <whole/m.csv)" -eq 25 ]'
+holds 'and what validation found' sh -c '[ "$(grep -c ",[01]$" whole/m.csv)" -eq 3 ]'
+holds 'no temporary file is left' sh -c '[ -z "$(ls whole | grep part)" ]'
+if command -v gnuplot >/dev/null 2>&1; then
+    holds 'there is a chart' grep -q '</svg>' whole/m.svg
+else
+    holds 'a missing gnuplot is told' grep -q 'no chart: gnuplot' out
+fi
+refuses 1 'whole/m.checkpoint: is there already: --resume' train whole.json
+run train whole.json --resume
+report $? 'a run that is done is resumed in vain'
+mkdir -p empty
+PATH=$folder/empty run train whole.json --resume
+holds 'without gnuplot a line says so' grep -q 'no chart: gnuplot' out
+
+# ---- Interrupted, in every way, the result is the same ----
+
+# equals FOLDER NAME: weights, latest weights and losses are those of the whole run.
+equals() {
+    cut -d , -f 1-7,9- whole/m.csv >whole.rows
+    cut -d , -f 1-7,9- "$1/m.csv" >"$1.rows"
+    cmp whole/m.safetensors "$1/m.safetensors" >out 2>err &&
+        cmp whole/m-latest.safetensors "$1/m-latest.safetensors" >out 2>err &&
+        cmp whole/m.checkpoint "$1/m.checkpoint" >out 2>err &&
+        cmp whole.rows "$1.rows" >out 2>err
+    report $? "$2"
+}
+
+config threads.json threads
+run train threads.json --threads 3
+equals threads 'three threads learn the same bits as one'
+
+config parts.json parts
+run train parts.json --iterations 5
+holds 'a run may stop early and says how to go on' grep -q 'ascc train parts.json --resume goes on' out
+run train parts.json --resume --iterations 13
+run train parts.json --resume
+equals parts 'three runs learn the same bits as one'
+
+config killed.json killed
+tries=0
+while [ $tries -lt 6 ] && ! grep -q '^24,' killed/m.csv 2>/dev/null; do
+    "$ascc" train killed.json --resume >out 2>err &
+    process=$!
+    sleep "0.$((2 + tries))$(awk 'BEGIN { srand(); print int(rand() * 10) }')"
+    kill -KILL $process 2>/dev/null
+    wait $process 2>/dev/null
+    tries=$((tries + 1))
+    if [ -f killed/m.checkpoint ]; then
+        holds "killed, the latest model is whole ($tries)" sh -c \
+            '[ ! -f killed/m-latest.safetensors ] || "$0" info killed/m-latest.safetensors' "$ascc"
+    fi
+done
+run train killed.json --resume
+report $? 'a run that was killed goes on'
+equals killed 'and learns the same bits'
+
+config stopped.json stopped 's/"iterations": 12/"iterations": 100000/g'
+"$ascc" train stopped.json >out 2>err &
+process=$!
+tries=0
+while [ $tries -lt 100 ] && [ ! -s stopped/m.checkpoint ]; do
+    sleep 0.1
+    tries=$((tries + 1))
+done
+kill -INT $process
+wait $process
+report $? 'an interrupted run ends well'
+holds 'and says how to go on' grep -q 'ascc train stopped.json --resume goes on' out
+holds 'and leaves a model' "$ascc" info stopped/m.safetensors
+
+# ---- A damaged checkpoint, a full disk ----
+
+config damaged.json damaged
+run train damaged.json --iterations 2
+head -c 300 damaged/m.checkpoint >cut && mv cut damaged/m.checkpoint
+refuses 1 'damaged/m.checkpoint: ' train damaged.json --resume
+
+config full.json full
+run train full.json --iterations 3
+cp full/m.checkpoint before.checkpoint
+# Files of at most one block: that is a disk without room for a checkpoint.
+sh -c 'trap "" XFSZ; ulimit -f 1; exec "$0" train full.json --resume' "$ascc" >out 2>full.err
+[ $? -eq 1 ] && grep -q 'ascc train: full/m' full.err && grep -qi 'too large' full.err
+report $? 'a full disk is an error that names the file'
+holds 'and the checkpoint from before is whole' cmp full/m.checkpoint before.checkpoint
+holds 'and can be gone on from' "$ascc" train full.json --resume --iterations 4
+
+config device.json device 's|"checkpoint": {|"checkpoint": {"path": "/dev/full/c", |'
+run train device.json --iterations 2
+[ $? -eq 1 ] && grep -q 'ascc train: /dev/full/c: ' err
+report $? 'a checkpoint that cannot be written is an error'
+config log.json log 's|"batch"|"log": "/dev/full", "batch"|'
+run train log.json --iterations 2
+[ $? -eq 1 ] && grep -q 'ascc train: /dev/full: ' err
+report $? 'a log that cannot be written is an error'
+
+# ---- The examples are configs that the program understands ----
+
+for example in "$source"/examples/train/*.json; do
+    [ -f "$example" ] || continue
+    sed -e 's|"[^"]*/liquid3d/[^"]*"|"data/*"|g' -e 's|"[^"]*/wbc2d/[^"]*"|"data/*"|g' "$example" >example.json
+    sed -i "s|\"output\": \"[^\"]*/[^\"]*\"|\"output\": \"$folder/nowhere/deep/m.safetensors\"|" example.json
+    run train example.json --iterations 1
+    [ $? -eq 1 ] && ! grep -q 'example.json: ' err
+    report $? "$(basename "$example") is understood"
+done
+
+if command -v script >/dev/null 2>&1; then
+    config bar.json bar
+    script -qec "'$ascc' train bar.json --iterations 9" /dev/null >out 2>err </dev/null
+    grep -q 'loss .* steps/s \[.*left' out
+    report $? 'a terminal gets a progress bar with loss and time left'
+fi
+echo "1..$number"
+exit $failed
