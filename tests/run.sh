@@ -63,7 +63,7 @@ export ASAN_OPTIONS=detect_leaks=1
 suite release --buildtype=release
 suite sanitize --buildtype=debugoptimized -Db_sanitize=address,undefined -Db_lundef=false \
     -Db_ndebug=false
-for t in tests/check_tree.sh tests/install_test.sh tests/cli_test.sh tests/docs_test.sh tests/convert_test.sh tests/bench_test.sh tests/stability_test.sh tests/cross_test.sh; do
+for t in tests/check_tree.sh tests/install_test.sh tests/cli_test.sh tests/train_test.sh tests/docs_test.sh tests/convert_test.sh tests/bench_test.sh tests/stability_test.sh tests/cross_test.sh; do
     [ -f "$t" ] && script "$t" build-release
 done
 script tests/cli_test.sh build-sanitize

@@ -64,6 +64,7 @@ static void test_every_variant_loads(void **state)
                 for (int variant = 0; variant < 8; variant++) {
                     ascc_architecture a = some(dimension, (ascc_architecture_family)kernel);
                     a.levels = levels;
+                    a.fine_layers = 5;
                     a.coarse_layers = 1 + (variant & 1);
                     if (variant & 2) {
                         a.output = ASCC_OUTPUT_PLAIN;
@@ -186,6 +187,9 @@ static void test_numbers_that_do_not_fit_are_refused_by_name(void **state)
     a = grid;
     a.damping = true;
     refused(&a, "damping");
+    a = grid;
+    a.levels = 3;
+    refused(&a, "fine_layers");
     a = grid;
     a.channels = 3;
     refused(&a, "channels");

@@ -320,7 +320,7 @@ static void add_crossing(writer *w, const crossing *c)
                                           .bumps = w->a->bumps,
                                           .radius = COARSE_RADIUS * c->voxel,
                                           .voxel = c->source_voxel,
-                                          .gain = 1.0,
+                                          .gain = 0.5,
                                           .bias = -1.0});
         return;
     }
@@ -532,9 +532,9 @@ static void plain_output(writer *w, const char *last)
                                       .bumps = a->bumps,
                                       .radius = a->radius * a->spacing,
                                       .voxel = a->spacing,
-                                      .gain = 0.1,
+                                      .gain = 0.01,
                                       .bias = 0.0});
-    add_wall_convolution(w, "correction", 0, a->dimension, 0.1);
+    add_wall_convolution(w, "correction", 0, a->dimension, 0.01);
     end_plain(w);
 }
 
@@ -659,16 +659,35 @@ static void grid_name(char name[32], int32_t layer, int32_t branch)
         (void)snprintf(name, 32, "l0");
 }
 
-/* A branch of a layer sees all branches of the layer before; the first layer has but one. */
+/* A branch sees those at most APART levels finer or coarser: farther, a point would have many thousands
+ * of neighbours. So branches come one layer after another, and go likewise before the last. */
+enum { APART = 2 };
+
+static bool branch_exists(const ascc_architecture *a, int32_t layer, int32_t branch)
+{
+    const int32_t last = a->fine_layers - 1;
+    return branch <= a->levels && branch <= APART * layer && branch <= APART * (last - layer);
+}
+
+static bool branch_sees(const ascc_architecture *a, int32_t layer, int32_t branch, int32_t from)
+{
+    return branch_exists(a, layer - 1, from) && abs(branch - from) <= APART;
+}
+
 static void grid_branch(writer *w, int32_t layer, int32_t branch)
 {
     const ascc_architecture *a = w->a;
-    const int32_t sources = layer > 1 ? a->levels + 1 : 1, outputs = channels_of(a, branch);
+    const int32_t outputs = channels_of(a, branch);
+    int32_t sources = 0;
     char name[32], source[32], points[16], part[64];
+    for (int32_t from = 0; from <= a->levels; from++)
+        sources += branch_sees(a, layer, branch, from);
     grid_name(name, layer, branch);
     points_of(branch, "all", points);
     begin_layer(w, name, points, outputs);
-    for (int32_t from = 0; from < sources; from++) {
+    for (int32_t from = 0; from <= a->levels; from++) {
+        if (!branch_sees(a, layer, branch, from))
+            continue;
         grid_name(source, layer - 1, from);
         (void)snprintf(part, sizeof part, "%s.%d", name, from);
         add_grid_convolution(w, &(grid_term){.name = part,
@@ -679,7 +698,7 @@ static void grid_branch(writer *w, int32_t layer, int32_t branch)
                                              .level = from > branch ? from : branch,
                                              .gain = 1.0 / sqrt(sources)});
     }
-    if (branch >= sources)
+    if (!branch_exists(a, layer - 1, branch))
         return;
     grid_name(source, layer - 1, branch);
     (void)snprintf(part, sizeof part, "%s.dense", name);
@@ -700,7 +719,7 @@ static void grid_antisymmetric_output(writer *w, const char *last)
         "\"window\":\"peak\",\"mapping\":\"volume\",\"projection\":\"%s\"}",
         last, SCALE * a->spacing, a->radius * a->spacing,
         ascc_architecture_projections[a->radial ? 1 : 0]);
-    add_plain_tensor(w, "output.kernel", 5, shape, 0.1);
+    add_plain_tensor(w, "output.kernel", 5, shape, 0.002);
 }
 
 static void grid_plain_output(writer *w, const char *last)
@@ -711,7 +730,7 @@ static void grid_plain_output(writer *w, const char *last)
                                          .relu = true,
                                          .inputs = w->a->channels,
                                          .outputs = w->a->dimension,
-                                         .gain = 0.1});
+                                         .gain = 0.01});
     end_plain(w);
 }
 
@@ -724,7 +743,7 @@ static void grid_network(writer *w)
                      "\"boundary\":[\"one\",\"normal\"]},\"layers\":[");
     grid_first_layer(w);
     for (int32_t layer = 1; layer <= last; layer++)
-        for (int32_t branch = 0; branch <= (layer < last ? a->levels : 0); branch++)
+        for (int32_t branch = 0; branch_exists(a, layer, branch); branch++)
             grid_branch(w, layer, branch);
     grid_name(name, last, 0);
     if (a->output == ASCC_OUTPUT_PLAIN)
@@ -809,6 +828,8 @@ static const char *grid_fault(const ascc_architecture *a)
         return "damping needs kernel basis";
     if (a->channels < 4)
         return "kernel grid takes at least 4 channels";
+    if (a->levels > APART * ((a->fine_layers - 1) / 2))
+        return "kernel grid takes 3 fine_layers for 2 levels, 5 for 3";
     if (a->radial && a->output == ASCC_OUTPUT_PLAIN)
         return "projection needs output antisymmetric";
     return NULL;

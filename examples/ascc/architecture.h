@@ -10,7 +10,7 @@
  *        level2        d2 ─► c2_1 ────┘             (walls enter at l0 and at each d)
  *
  *   family GRID    the paper's: layers on fluid and walls, every branch sees every branch of the
- *                  layer before.
+ *                  layer before that is at most two levels away.
  */
 #ifndef ASCC_ARCHITECTURE_H
 #define ASCC_ARCHITECTURE_H
