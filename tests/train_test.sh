@@ -186,6 +186,17 @@ report $? 'an interrupted run ends well'
 holds 'and says how to go on' grep -q 'ascc train stopped.json --resume goes on' out
 holds 'and leaves a model' "$ascc" info stopped/m.safetensors
 
+# ---- A network that cannot be computed ----
+
+# The last 20 weights become the largest float there is.
+config huge.json huge 's/"network": {/"model": "huge.safetensors",/; /"name"/d; /"levels"/,/}/d'
+head -c -80 whole/m.safetensors >huge.safetensors
+for weight in 1 2 3 4 5 6 7 8 9 10 11 12 13 14 15 16 17 18 19 20; do
+    printf '\377\377\177\177' >>huge.safetensors
+done
+refuses 1 'iteration 20: no rollout could be computed' train huge.json
+holds 'the weights before are saved, and that is told' grep -q 'huge/m.checkpoint and huge/m.*hold iteration' err
+
 # ---- A damaged checkpoint, a full disk ----
 
 config damaged.json damaged

@@ -38,9 +38,10 @@ typedef struct training {
     size_t truth_count;
     ascc_progress progress;
     char label[160];
-    double loss;  /* of late */
-    double speed; /* steps a second, of late */
-    double saved; /* when the last checkpoint was written, s */
+    double loss;     /* of late */
+    double speed;    /* steps a second, of late */
+    int32_t skipped; /* iterations of late without any rollout */
+    double saved;    /* when the last checkpoint was written, s */
     char error[512];
 } training;
 
@@ -304,7 +305,8 @@ static void show(training *t, const ascc_training_report *report)
     const ascc_validation *v = &t->log.last;
     const double share = t->loss > 0.0 ? 0.05 : 1.0;
     const double speed = report->seconds > 0.0 ? report->steps / report->seconds : 0.0;
-    t->loss += share * (report->loss - t->loss);
+    if (isfinite(report->loss))
+        t->loss += share * (report->loss - t->loss);
     t->speed += share * (speed - t->speed);
     int length = snprintf(t->label, sizeof t->label, "loss %.4f", t->loss);
     if (v->measured)
@@ -313,6 +315,23 @@ static void show(training *t, const ascc_training_report *report)
                      1e3 * v->error[0], 1e3 * v->error[1], v->stable ? "" : " unstable");
     (void)snprintf(t->label + length, sizeof t->label - (size_t)length, "  %.1f steps/s", t->speed);
     ascc_progress_add(&t->progress, 1);
+}
+
+/* An iteration without any rollout has no loss; many in a row learn nothing. */
+static bool count_skipped(training *t, ascc_training_report *report)
+{
+    enum { MOST = 20 };
+    if (report->skipped < t->config.options.batch) {
+        t->skipped = 0;
+        return true;
+    }
+    report->loss = NAN;
+    if (++t->skipped < MOST)
+        return true;
+    (void)snprintf(t->error, sizeof t->error,
+                   "iteration %" PRIu64 ": no rollout could be computed, nor in the %d before",
+                   report->iteration, MOST - 1);
+    return false;
 }
 
 static bool iterate(training *t)
@@ -324,12 +343,15 @@ static bool iterate(training *t)
                        ascc_trainer_iteration(t->trainer) + 1, ascc_trainer_message(t->trainer));
         return false;
     }
+    const bool learned = count_skipped(t, &report);
     const bool due =
         report.iteration % t->config.validate_every == 0 || report.iteration == schedule_end(t);
     if (t->truth_count && due && !validate(t, &v))
         return false;
     if (!ascc_train_log_add(&t->log, stage_of(t, report.iteration), &report, &v))
         return fail(t, t->config.log, strerror(errno));
+    if (!learned)
+        return false;
     show(t, &report);
     return now() - t->saved < t->config.checkpoint_seconds || save(t);
 }

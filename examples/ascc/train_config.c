@@ -261,7 +261,7 @@ static void read_options(reading *g, uint32_t root, ascc_trainer_options *o)
     ascc_reader *r = &g->r;
     o->size = sizeof *o;
     o->seed = (uint64_t)integer_or(r, root, "seed", 0, INT32_MAX, 1);
-    o->batch = integer_or(r, root, "batch", 1, 4096, 0);
+    o->batch = integer_or(r, root, "batch", 1, 4096, 8);
     o->clip = number_or(r, root, "clip", 1e-30, 1e30, 0.0);
     o->average = number_or(r, root, "average", 0.0, 1.0, 0.0);
     o->jitter = number_or(r, root, "jitter", 0.0, 10.0, 0.0);
