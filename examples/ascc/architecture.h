@@ -7,7 +7,7 @@
  *                 ▼                                 ▲
  *        level1  d1 ─► c1_1 ────────► u1 ─► v1 ─────┘
  *                       ▼             ▲
- *        level2        d2 ─► c2_1 ────┘             (walls enter at l0 and at each d)
+ *        level2        d2 ─► c2_1 ────┘             (walls enter at l0 and at d1)
  *
  *   family GRID    the paper's: layers on fluid and walls, every branch sees every branch of the
  *                  layer before that is at most two levels away.
