@@ -67,6 +67,7 @@ for t in tests/check_tree.sh tests/install_test.sh tests/cli_test.sh tests/train
     [ -f "$t" ] && script "$t" build-release
 done
 script tests/cli_test.sh build-sanitize
+script tests/train_test.sh build-sanitize
 
 echo "$passed passed, $failed failed"
 [ "$failed" -eq 0 ]

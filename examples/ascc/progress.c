@@ -20,7 +20,9 @@ static void draw(const ascc_progress *p, double time)
     const double share = p->total ? (double)p->done / (double)p->total : 1.0;
     const double spent = time - p->started, done = (double)(p->done - p->before);
     const double rate = spent > 0.0 ? done / spent : 0.0;
-    const double left = rate > 0.0 ? (double)(p->total - p->done) / rate : 0.0;
+    const double left = p->work > 0.0 ? spent / p->work * p->work_left
+                        : rate > 0.0  ? (double)(p->total - p->done) / rate
+                                      : 0.0;
     char bar[WIDTH + 1];
     for (int i = 0; i < WIDTH; i++)
         bar[i] = i < (int)(share * WIDTH) ? '#' : '.';
@@ -38,6 +40,7 @@ void ascc_progress_start(ascc_progress *p, const char *label, size_t total)
 {
     p->label = label;
     p->done = p->before = 0;
+    p->work = p->work_left = 0.0;
     p->total = total;
     p->started = p->drawn = now();
     p->visible = isatty(STDERR_FILENO) != 0;

@@ -10,6 +10,8 @@ typedef struct ascc_progress {
     size_t done, total;
     size_t before;         /* done in an earlier run: without influence on the rate */
     double started, drawn; /* s */
+    double work,
+        work_left; /* set for unlike pieces: done in this run, and to do; 0 = all are alike */
     bool visible;
 } ascc_progress;
 

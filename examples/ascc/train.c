@@ -300,6 +300,26 @@ static bool save(training *t)
     return write_model(t, c->latest) && (t->log.best.measured || write_model(t, c->output));
 }
 
+/* What an iteration of a stage takes: steps back and forth, and on average half the steps before. */
+static double work_of(const ascc_training_stage *stage)
+{
+    return 3.5 * stage->horizon + 0.5 * stage->presteps;
+}
+
+static double work_between(const training *t, uint64_t first, uint64_t end)
+{
+    double work = 0.0;
+    uint64_t begin = 0;
+    for (int32_t i = 0; i < t->config.options.stage_count; i++) {
+        const ascc_training_stage *stage = &t->config.stage[i];
+        const uint64_t from = begin > first ? begin : first;
+        const uint64_t to = stage->end < end ? stage->end : end;
+        work += to > from ? (double)(to - from) * work_of(stage) : 0.0;
+        begin = stage->end;
+    }
+    return work;
+}
+
 static void show(training *t, const ascc_training_report *report)
 {
     const ascc_validation *v = &t->log.last;
@@ -314,6 +334,8 @@ static void show(training *t, const ascc_training_report *report)
             snprintf(t->label + length, sizeof t->label - (size_t)length, "  errors %.2f/%.2f mm%s",
                      1e3 * v->error[0], 1e3 * v->error[1], v->stable ? "" : " unstable");
     (void)snprintf(t->label + length, sizeof t->label - (size_t)length, "  %.1f steps/s", t->speed);
+    t->progress.work = work_between(t, t->progress.before, report->iteration);
+    t->progress.work_left = work_between(t, report->iteration, t->end);
     ascc_progress_add(&t->progress, 1);
 }
 

@@ -156,7 +156,9 @@ static void write_script(FILE *g, const char *log, const char *chart, bool valid
 {
     fputs("set terminal svg size 900,640 background 'white'\nset output ", g);
     quoted(g, chart);
-    fputs("\nset datafile separator ','\nset key top right\nset grid\nset logscale y\n", g);
+    fputs("\nset datafile separator ','\nset key top right\nset grid\nset xrange [0:*]\nset "
+          "logscale y\n",
+          g);
     fprintf(g, "set multiplot layout %d,1\nset ylabel 'loss, spacings'\n", validated ? 2 : 1);
     if (!validated)
         fputs("set xlabel 'iteration'\n", g);
