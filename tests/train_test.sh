@@ -156,10 +156,10 @@ equals parts 'three runs learn the same bits as one'
 
 config killed.json killed
 tries=0
-while [ $tries -lt 6 ] && ! grep -q '^24,' killed/m.csv 2>/dev/null; do
+while [ $tries -lt 5 ] && ! grep -q '^24,' killed/m.csv 2>/dev/null; do
     "$ascc" train killed.json --resume >out 2>err &
     process=$!
-    sleep "0.$((2 + tries))$(awk 'BEGIN { srand(); print int(rand() * 10) }')"
+    sleep "0.0$((4 + tries))$(awk 'BEGIN { srand(); print int(rand() * 10) }')"
     kill -KILL $process 2>/dev/null
     wait $process 2>/dev/null
     tries=$((tries + 1))
