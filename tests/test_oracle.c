@@ -154,7 +154,7 @@ static void grids_equal_doubles(void **state)
                                      .boundary_crop = v % 3 ? 2.5 : 0.0};
         worst = fmax(worst, check("grid", v, &random));
     }
-    print_message("grids: %.2g\n", worst);
+    print_message("# grids: %.2g\n", worst);
 }
 
 static void plain_outputs_equal_doubles(void **state)
@@ -172,7 +172,7 @@ static void plain_outputs_equal_doubles(void **state)
                                      .evaluate = v < 6 ? "current" : "advected"};
         worst = fmax(worst, check("plain", v, &random));
     }
-    print_message("plain: %.2g\n", worst);
+    print_message("# plain: %.2g\n", worst);
 }
 
 static void levels_equal_doubles(void **state)
@@ -201,7 +201,7 @@ static void levels_equal_doubles(void **state)
                                      .boundary_crop = v % 3 ? 0.0 : 2.5};
         worst = fmax(worst, check("levels", v, &random));
     }
-    print_message("levels: %.2g\n", worst);
+    print_message("# levels: %.2g\n", worst);
 }
 
 static void bases_equal_doubles(void **state)
@@ -219,7 +219,7 @@ static void bases_equal_doubles(void **state)
                                      .evaluate = v / 3 % 2 ? "current" : "advected"};
         worst = fmax(worst, check("basis", v, &random));
     }
-    print_message("bases: %.2g\n", worst);
+    print_message("# bases: %.2g\n", worst);
 }
 
 static void motion_and_its_damping_equal_doubles(void **state)
@@ -244,7 +244,7 @@ static void motion_and_its_damping_equal_doubles(void **state)
                                      .evaluate = v % 3 ? "advected" : "current"};
         worst = fmax(worst, check("motion", v, &random));
     }
-    print_message("motion: %.2g\n", worst);
+    print_message("# motion: %.2g\n", worst);
 }
 
 int main(void)
