@@ -32,10 +32,13 @@ sources=$(find lib -name '*.c' -o -name '*.h' | sort)
 
 check 'kernels include only kernels and libc' "$(
     grep -nE '^ *# *include' lib/kernels/* | grep -vE "<($libc)\.h>|\"($kernels)\.h\"|select\.c:.*<ascc/ascc\.h>")"
+runtime=$(echo "$sources" | grep -v '^lib/train/')
 check 'lib includes nothing above it' "$(
-    grep -nE '# *include .*(\.\./|examples|tests|bench|train)' $sources)"
+    grep -nE '# *include .*(\.\./|examples|tests|bench|train)' $runtime)"
+check 'the trainer includes nothing but lib and itself' "$(
+    grep -nE '# *include .*(\.\./\.\./\.\.|examples|tests|bench)' $(echo "$sources" | grep '^lib/train/'))"
 check 'lib includes only itself and libc' "$(
-    grep -nE '# *include *<' $sources | grep -vE "<($libc)\.h>|<ascc/ascc\.h>|ascc/version\.h")"
+    grep -nE '# *include *<' $sources | grep -vE '^lib/train/.*<ascc/train\.h>' | grep -vE "<($libc)\.h>|<ascc/ascc\.h>|ascc/version\.h")"
 check 'model files know nothing of points, points nothing of models' "$(
     grep -nE '# *include *"(particles|neighbors|resample|hierarchy)\.h"' lib/model.[ch] lib/plan.[ch] \
         lib/description.[ch] lib/safetensors.[ch] lib/published.[ch] lib/json*.[ch]

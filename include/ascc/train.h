@@ -102,7 +102,7 @@ ASCC_API ascc_status ascc_trainer_iterate(ascc_trainer *trainer, ascc_training_r
 
 /**
  * Loss and gradient of one rollout, not augmented: `presteps` steps without gradient from `frame` >= 1,
- * then `horizon` with. gradient: [ascc_trainer_parameter_count] or NULL (then it is not computed).
+ * then `horizon` with; the stages of the options have one as long. gradient: [ascc_trainer_parameter_count] or NULL (then it is not computed).
  */
 ASCC_API ascc_status ascc_trainer_gradient(ascc_trainer *trainer, size_t sequence, size_t frame,
                                            int32_t presteps, int32_t horizon, double *loss,

@@ -162,12 +162,8 @@ static ascc_status measure(ascc_kept_sequence *s, const ascc_allocator *allocato
             status = measure_walls(s, plan, x, x + n, tools, &h[1]);
     }
     if (status == ASCC_OK) {
-        double sum = 0.0;
-        for (size_t i = 0; i < s->frame_count * s->fluid_count; i++)
-            sum += s->near[i];
-        s->near_mean = fmax(sum / (double)(s->frame_count * s->fluid_count), 1e-9);
         s->dense = percentile(&h[0], 0.95);
-        s->wall_depth = h[1].total ? percentile(&h[1], 0.05) * plan->spacing : 0.0;
+        s->wall_depth = h[1].total ? percentile(&h[1], 0.05) * plan->spacing : -INFINITY;
     }
     if (x)
         ascc_release(allocator, x, n + w, sizeof *x);

@@ -15,7 +15,6 @@ typedef struct ascc_kept_sequence {
     float *position, *wall, *normal; /* [frame][fluid][d], [boundary][d] */
     double gravity[3], share;
     uint16_t *near;    /* [frame][fluid]: other fluid particles within the support radius */
-    double near_mean;  /* over all frames */
     double dense;      /* rho_95 of docs/training.md */
     double wall_depth; /* s_05, m */
 } ascc_kept_sequence;

@@ -569,8 +569,10 @@ static ascc_status sum_up(ascc_trainer *t, ascc_training_report *report)
 ascc_status ascc_trainer_iterate(ascc_trainer *t, ascc_training_report *report)
 {
     ascc_training_report own = {0};
-    if (!alive(t) || !report || !ascc_write_struct(report, &own, sizeof own, sizeof own))
+    if (!alive(t))
         return ASCC_ERROR_ARGUMENT;
+    if (!report || !ascc_write_struct(report, &own, sizeof own, sizeof own))
+        return FAIL(ASCC_ERROR_ARGUMENT, "ascc_training_report.size is not understood");
     const double begin = now();
     const ascc_training_stage *stage = find_stage(t, &own.learning_rate);
     own.horizon = stage->horizon;
