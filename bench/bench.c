@@ -12,7 +12,7 @@
 #include <time.h>
 
 static const char usage[] =
-    "usage: bench kernel|step|threads|scale|roofline|load|all [options]\n"
+    "usage: bench kernel|step|threads|scale|roofline|load|train|all [options]\n"
     "  --quick             smaller scenes, fewer repeats\n"
     "  --only TEXT         kernels whose names hold the text\n"
     "  --scene NAME        block, dam-break, still-column, droplets, free-fall or a sequence file\n"
@@ -288,7 +288,8 @@ int main(int count, char **arguments)
         const char *name;
         void (*run)(const bench_options *);
     } commands[] = {{"load", bench_load}, {"kernel", bench_kernel},   {"roofline", bench_roofline},
-                    {"step", bench_step}, {"threads", bench_threads}, {"scale", bench_scale}};
+                    {"step", bench_step}, {"threads", bench_threads}, {"scale", bench_scale},
+                    {"train", bench_train}};
     const bench_options options = read_options(count, arguments);
     bool known = false;
     for (size_t i = 0; i < sizeof commands / sizeof *commands; i++)

@@ -121,6 +121,7 @@ void bench_step(const bench_options *options);
 void bench_threads(const bench_options *options);
 void bench_scale(const bench_options *options);
 void bench_load(const bench_options *options);
+void bench_train(const bench_options *options);
 
 /* The antisymmetric layer 32 -> 3, kernel 6x6x6, on a block: the library's with integer sums, and a
  * twin that sums floats. */
