@@ -15,7 +15,7 @@ typedef struct cell {
     long frame;           /* run: of the longest simulation of the scene */
     double budget, start; /* CPU seconds */
     verdict verdict;
-    char text[128]; /* why it failed */
+    char text[128]; /* why it failed, or a remark on a pass */
 } cell;
 
 /* A running simulation of a world, which must outlive it. */
@@ -28,6 +28,13 @@ typedef struct simulation {
 
 /* Calls the cell failed, if it is not yet; returns false. */
 bool cell_fail(cell *c, const char *format, ...)
+#if defined(__GNUC__)
+    __attribute__((format(printf, 2, 3)))
+#endif
+    ;
+
+/* A remark that stands behind a pass. */
+void cell_say(cell *c, const char *format, ...)
 #if defined(__GNUC__)
     __attribute__((format(printf, 2, 3)))
 #endif
@@ -47,6 +54,8 @@ ascc_measure_motion_sums cell_motion(const simulation *s);
 bool cell_nothing_escapes(cell *c, const simulation *s);
 /* At most one in 1,000 pairs nearer than a fifth of the spacing. */
 bool cell_nothing_clumps(cell *c, const simulation *s);
+/* Mean density of the fluid by the poly6 window, of rest density. */
+double cell_density(const simulation *s);
 bool cell_slower_than(cell *c, const simulation *s, double speed);
 
 #endif

@@ -102,11 +102,12 @@ static void run_cell(const suite *s, board *b, size_t k)
 static void verdict_text(const cell *c, char *text, size_t capacity)
 {
     if (c->verdict == FAIL)
-        snprintf(text, capacity, "frame %ld: %s", c->frame, c->text);
+        snprintf(text, capacity, "frame %ld of %ld: %s", c->frame, c->frames, c->text);
     else if (c->verdict == CUT)
         snprintf(text, capacity, "no failure in %ld of %ld", c->frame, c->frames);
     else
-        snprintf(text, capacity, "pass (%ld)", c->frame);
+        snprintf(text, capacity, "pass: %ld of %ld%s%s", c->frame, c->frames,
+                 c->text[0] ? ", " : "", c->text);
 }
 
 static void work(const suite *s, board *b)
