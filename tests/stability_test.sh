@@ -42,6 +42,10 @@ holds 'the matrix replaces the old one, and nothing else' sh -c '
 holds 'the picture is whole' sh -c 'tail -n 1 docs/figures/stability.svg | grep -qF "</svg>"'
 "$stability" --quick --budget 0.000001 --methods SPH --scenes 'still column' --jobs 1 >out 2>err
 holds 'a cell out of time does not pass' grep -q 'no failure in 0 of' out
+"$stability" --quick --frames 2 --methods none --model demo --model some/where.safetensors \
+    --scenes 'single particle' --jobs 1 >out 2>err
+holds 'a model file is a method more' grep -qE '^single particle +demo .* pass: 2 of 2' out
+holds 'a file that is not there fails its cells' grep -qE '^single particle +where .* frame 0 of 2: model' out
 "$stability" --scenes nowhere >out 2>err
 holds 'a scene that is not there is an error' [ $? -eq 1 ]
 echo "1..$number"
