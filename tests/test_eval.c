@@ -225,7 +225,8 @@ static void a_method_of_ones_own_is_measured(void **state)
  * velocity is moved back half a step for that, see method_pbf.c. */
 static void reference_solvers_fly_freely(void **state)
 {
-    static const char *const methods[] = {"sph:cs=20", "pbf:", "pbf:iterations=2,substeps=3"};
+    static const char *const methods[] = {"sph:cs=20", "sph:cs=20,contact=-1,coarse=1.5",
+                                          "pbf:", "pbf:iterations=2,substeps=3"};
     (void)state;
     for (size_t k = 0; k < sizeof methods / sizeof *methods; k++) {
         assert_int_equal(evaluate(methods[k], "test_eval.json", "--frames", "0:20:10"), 0);
