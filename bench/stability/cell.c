@@ -46,6 +46,30 @@ bool cell_open(cell *c, const world *w, simulation *s)
     return true;
 }
 
+bool cell_has_bodies(cell *c)
+{
+    if (c->method->move_body)
+        return true;
+    c->verdict = NONE;
+    snprintf(c->text, sizeof c->text, "no bodies that move");
+    return false;
+}
+
+bool cell_move_body(cell *c, simulation *s, world *w, double mass, double velocity[3])
+{
+    const ascc_method_scene *scene = &w->scene;
+    ascc_method_error error = {"the body cannot be moved"};
+    double impulse[3], by[3];
+    c->method->body_impulse(s->state, impulse);
+    for (int a = 0; a < 3; a++) {
+        velocity[a] += impulse[a] / mass + scene->time_step * scene->gravity[a];
+        by[a] = scene->time_step * velocity[a];
+        for (size_t i = scene->wall_count - scene->body_count; i < scene->wall_count; i++)
+            w->wall[3 * i + (size_t)a] += by[a];
+    }
+    return c->method->move_body(s->state, by, &error) || cell_fail(c, "%.100s", error.text);
+}
+
 void cell_close(cell *c, simulation *s)
 {
     if (s->state)

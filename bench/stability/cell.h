@@ -6,7 +6,12 @@
 #include "measures.h"
 #include "world.h"
 
-typedef enum verdict { PASS = 0, FAIL = 1, CUT = 2 /* no failure until the time was up */ } verdict;
+typedef enum verdict {
+    PASS = 0,
+    FAIL = 1,
+    CUT = 2, /* no failure until the time was up */
+    NONE = 3 /* the method does not do what the scene asks */
+} verdict;
 
 typedef struct cell {
     const ascc_method *method;
@@ -42,6 +47,11 @@ void cell_say(cell *c, const char *format, ...)
 
 /* False: the method refused the world, and the cell has failed. Close either way. */
 bool cell_open(cell *c, const world *w, simulation *s);
+/* False: the method moves no bodies, and the cell says so. */
+bool cell_has_bodies(cell *c);
+/* The body of the world at its mass, kg, for a frame: what the fluid gave it in the last one and gravity.
+ * Moves its wall points in the world as well. */
+bool cell_move_body(cell *c, simulation *s, world *w, double mass, double velocity[3]);
 /* One frame. False: the cell has failed (a step that fails, a number that is not finite), has run all
  * its frames, or is out of time. */
 bool cell_step(cell *c, simulation *s);

@@ -427,6 +427,64 @@ static void sharp_edge(cell *c)
     world_free(&w);
 }
 
+/* ---- A body ---------------------------------------------------------------------------------- */
+
+/* Whether the body has moved by a spacing; fails the cell if that was the wrong way, or so fast that
+ * the fluid does not carry it. */
+static bool body_arrived(cell *c, double ratio, double moved, double frame, long frames)
+{
+    const double flight = 0.5 * G * frame * frame * (double)(frames * (frames + 1));
+    if (!(fabs(moved) > SPACING))
+        return false;
+    if ((moved > 0.0) != (ratio < 1.0))
+        cell_fail(c, "body moves %+.1f spacings", moved / SPACING);
+    else if (moved < -0.8 * flight)
+        cell_fail(c, "body falls as if without fluid");
+    cell_say(c, "%ld after it is free", frames);
+    return true;
+}
+
+/* A cube in the middle of a tank, held for half of the frames, then free. Its mass is that of the fluid
+ * taken out for it times `ratio`. It ends where it has moved by a spacing: nothing holds it at the floor. */
+static void buoyancy(cell *c, double ratio)
+{
+    const double middle[3] = {5.5 * SPACING, 6.5 * SPACING, 5.5 * SPACING};
+    world w = tank(SPACING, (int[]){10, 12, 10}, (int[]){11, 18, 11});
+    const size_t full = w.scene.fluid_count;
+    double velocity[3] = {0.0, 0.0, 0.0}, moved = 0.0;
+    simulation s = {.world = &w};
+    world_body(&w, middle, 3.0);
+    const double mass = ratio * w.scene.mass * (double)(full - w.scene.fluid_count);
+    const double *first = w.wall + 3 * (w.scene.wall_count - w.scene.body_count);
+    const double start = first[1];
+    bool good = cell_has_bodies(c);
+    good = good && cell_open(c, &w, &s);
+    while (good && cell_step(c, &s)) {
+        const long loose = s.frame - c->frames / 2;
+        good = cell_nothing_escapes(c, &s);
+        if (!good || loose <= 0)
+            continue;
+        good = cell_move_body(c, &s, &w, mass, velocity);
+        moved = first[1] - start;
+        if (body_arrived(c, ratio, moved, w.scene.time_step, loose))
+            break;
+    }
+    if (good && cell_complete(c, &s) && !(fabs(moved) > SPACING))
+        cell_fail(c, "body moved %+.2g spacings", moved / SPACING);
+    cell_close(c, &s);
+    world_free(&w);
+}
+
+static void light_body(cell *c)
+{
+    buoyancy(c, 0.5);
+}
+
+static void heavy_body(cell *c)
+{
+    buoyancy(c, 2.0);
+}
+
 /* ---- The table ------------------------------------------------------------------------------- */
 
 #define DAM                                                                                        \
@@ -470,5 +528,9 @@ const stability_scene stability_scenes[] = {
      "a block falls on a wedge of 39 degrees: no escape, nothing twice as fast as a fall through "
      "the box",
      40, 200, sharp_edge},
+    {"light body",
+     "a cube of half the fluid's density, held, then free for as long: no escape, up by a spacing",
+     40, 200, light_body},
+    {"heavy body", "twice the density: down, by at most 0.8 of a free fall", 40, 200, heavy_body},
     {NULL, NULL, 0, 0, NULL},
 };

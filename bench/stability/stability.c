@@ -148,6 +148,8 @@ static void verdict_text(const cell *c, char *text, size_t capacity)
         snprintf(text, capacity, "frame %ld of %ld: %s", c->frame, c->frames, c->text);
     else if (c->verdict == CUT)
         snprintf(text, capacity, "no failure in %ld of %ld", c->frame, c->frames);
+    else if (c->verdict == NONE)
+        snprintf(text, capacity, "%s", c->text);
     else
         snprintf(text, capacity, "pass: %ld of %ld%s%s", c->frame, c->frames,
                  c->text[0] ? ", " : "", c->text);
@@ -268,7 +270,7 @@ static void svg_text(FILE *f, int x, int y, const char *style, const char *text,
 static void write_svg(FILE *f, const suite *s, const board *b)
 {
     enum { WIDE = 190, HIGH = 38, LEFT = 140, TOP = 34 };
-    static const char *const colour[] = {"#b7e1b0", "#f4b6ae", "#f7e6a4"};
+    static const char *const colour[] = {"#b7e1b0", "#f4b6ae", "#f7e6a4", "#e4e4e4"};
     const int width = LEFT + WIDE * (int)s->method_count + 10,
               height = TOP + HIGH * (int)s->scene_count + 34;
     fprintf(f,
@@ -294,10 +296,12 @@ static void write_svg(FILE *f, const suite *s, const board *b)
                 snprintf(first, sizeof first, "failed: frame %ld of %ld", c->frame, c->frames);
             else if (c->verdict == CUT)
                 snprintf(first, sizeof first, "out of time, no failure");
+            else if (c->verdict == NONE)
+                snprintf(first, sizeof first, "not asked");
             else
                 snprintf(first, sizeof first, "pass");
             svg_text(f, x + 7, y + 16, c->verdict == PASS ? "font-weight=\"bold\"" : "", first, 40);
-            if (c->verdict == FAIL)
+            if (c->verdict == FAIL || c->verdict == NONE)
                 snprintf(first, sizeof first, "%.60s", c->text);
             else
                 snprintf(first, sizeof first, "%ld of %ld frames", c->frame, c->frames);

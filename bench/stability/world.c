@@ -114,6 +114,41 @@ void world_wedge(world *w, double middle, double half, double height, double dep
             }
 }
 
+static void take_out(world *w, const double center[3], double half)
+{
+    size_t kept = 0;
+    for (size_t i = 0; i < w->scene.fluid_count; i++) {
+        const double *x = w->position + 3 * i;
+        if (fabs(x[0] - center[0]) < half && fabs(x[1] - center[1]) < half &&
+            fabs(x[2] - center[2]) < half)
+            continue;
+        memmove(w->position + 3 * kept, x, 3 * sizeof(double));
+        memmove(w->velocity + 3 * kept, w->velocity + 3 * i, 3 * sizeof(double));
+        kept++;
+    }
+    w->scene.fluid_count = kept;
+}
+
+void world_body(world *w, const double center[3], double edge)
+{
+    const double s = w->scene.spacing;
+    const int m = (int)ceil(edge / WALL_SPACING);
+    const size_t walls = w->scene.wall_count;
+    for (int axis = 0; axis < 3; axis++)
+        for (int side = -1; side <= 1; side += 2)
+            for (int j = 0; j < m; j++)
+                for (int k = 0; k < m; k++) {
+                    double x[3], normal[3] = {0.0, 0.0, 0.0};
+                    x[axis] = center[axis] + 0.5 * side * edge * s;
+                    x[(axis + 1) % 3] = center[(axis + 1) % 3] + ((j + 0.5) / m - 0.5) * edge * s;
+                    x[(axis + 2) % 3] = center[(axis + 2) % 3] + ((k + 0.5) / m - 0.5) * edge * s;
+                    normal[axis] = side;
+                    add_wall(w, x, normal);
+                }
+    w->scene.body_count = w->scene.wall_count - walls;
+    take_out(w, center, (0.5 * edge + 0.99) * s);
+}
+
 static double *duplicate(const double *array, size_t rows)
 {
     double *copy = more(NULL, rows);

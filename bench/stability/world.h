@@ -29,6 +29,9 @@ void world_tube(world *w, const double edges[3]);
  * and length, in spacings. */
 void world_wedge(world *w, double middle, double half, double height, double depth);
 
+/* A cube in the fluid that may move, its edge in spacings: fluid nearer than a spacing is taken out. */
+void world_body(world *w, const double center[3], double edge);
+
 /* Turned world: y becomes x, z becomes y, x becomes z. Upside down: y becomes -y. On one row of three
  * numbers and on a whole world; back undoes. */
 typedef void world_map(double row[3]);

@@ -29,6 +29,7 @@ typedef struct ascc_method_scene {
     size_t fluid_count, wall_count;
     const double *wall, *normal; /* [wall_count][dimension] */
     size_t first_layer;          /* wall points that touch the fluid: the first so many */
+    size_t body_count;           /* wall points of a body that moves: the last so many */
 } ascc_method_scene;
 
 /** Why a method failed. */
@@ -52,6 +53,10 @@ typedef struct ascc_method {
     /* Momentum that gravity gave to the fluid and that the fluid gave to walls in the last frame, kg
      * m/s; NULL if the method cannot tell. */
     void (*impulses)(const void *state, double external[3], double wall[3]);
+    /* Moves the scene's body before the next frame, and tells what the fluid gave to it in the last one,
+     * kg m/s; NULL if the method has no such bodies. */
+    bool (*move_body)(void *state, const double by[3], ascc_method_error *error);
+    void (*body_impulse)(const void *state, double impulse[3]);
     void (*close)(void *state);
 } ascc_method;
 
