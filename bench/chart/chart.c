@@ -146,8 +146,10 @@ static bool accuracy(const ascc_truth *t, const ascc_method *method, const char 
     if (good) {
         r->error[0] = figure(run, "err_n2_difference");
         r->error[1] = 0.5 * (figure(run, "chamfer_1s_gt2pred") + figure(run, "chamfer_1s_pred2gt"));
-        r->error[2] = figure(run, "density_mean_error_1s");
-        r->density_max = figure(run, "density_max_error_1s");
+        /* Carried particles (method_coarse.h): nothing keeps them apart or draws them together. */
+        const bool carried = strstr(settings, "coarse=") != NULL;
+        r->error[2] = carried ? NAN : figure(run, "density_mean_error_1s");
+        r->density_max = carried ? NAN : figure(run, "density_max_error_1s");
         r->escaped = figure(run, "escaped_max");
         r->last = figure(run, "last_frame");
         snprintf(r->note, sizeof r->note, "%s", run->note);

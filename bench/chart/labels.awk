@@ -31,7 +31,7 @@ BEGIN { WIDE = 410; HIGH = 365; n = placed = 0 }
     split($0, q, "\"")
     split(q[1], a, ",")
     split(q[5], b, ",")
-    if (a[1] != s || a[2] == "floor" || !(b[3] > 0) || !(b[e] > 0))
+    if (a[1] != s || a[2] == "floor" || !(b[3] > 0) || b[e] ~ /nan/ || !(b[e] > 0))
         next
     n++
     family[n] = a[2]
