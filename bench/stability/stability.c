@@ -5,7 +5,8 @@
  *             [--model FILE]... [--frames N] [--minutes M] [--budget SECONDS] [--jobs N]
  *
  * The whole may take M minutes on idle cores. A cell may use four times its part of the time that is left,
- * since most end early. Scenes of few frames come first, so the long ones get nearly all of it.
+ * since most end early. Scenes of few frames come first, so the long ones get nearly all of it; in a scene
+ * the methods at the end of the table, which are cheap, and models given.
  */
 #define _DEFAULT_SOURCE /* MAP_ANONYMOUS, getloadavg */
 #include <math.h>
@@ -160,7 +161,8 @@ static void work(const suite *s, board *b)
     const size_t count = s->scene_count * s->method_count;
     for (size_t k; (k = atomic_fetch_add(&b->next, 1)) < count;) {
         char text[256];
-        const size_t i = s->order[k / s->method_count], j = k % s->method_count;
+        const size_t i = s->order[k / s->method_count];
+        const size_t j = s->method_count - 1 - k % s->method_count;
         run_cell(s, b, i, j);
         verdict_text(&b->cells[i][j], text, sizeof text);
         printf("%-18s %-14s %6.1f s  %s\n", s->scene[i]->name, s->method[j], b->seconds[i][j],
