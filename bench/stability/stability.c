@@ -9,6 +9,7 @@
  * the methods at the end of the table, which are cheap, and models given.
  */
 #define _DEFAULT_SOURCE /* MAP_ANONYMOUS, getloadavg */
+#include <glob.h>
 #include <math.h>
 #include <stdatomic.h>
 #include <stdio.h>
@@ -97,6 +98,11 @@ static void add_method(suite *s, const char *name, const char *word)
     s->method_count++;
 }
 
+static void add_model(suite *s, const char *path)
+{
+    s->model[s->model_count++] = path;
+}
+
 /* Files given with --model run whatever --methods names; "some/folder/name.safetensors" is `name`. */
 static void choose_methods(suite *s)
 {
@@ -111,6 +117,12 @@ static void choose_methods(suite *s)
         else
             add_method(s, methods[m][0], shared ? path : methods[m][1]);
     }
+    /* The project's own models, as the chart has them; kept until the end. */
+    static glob_t own;
+    if (!s->only_methods && !s->model_count &&
+        glob("examples/models/*.safetensors", 0, NULL, &own) == 0)
+        while (s->model_count < own.gl_pathc && s->model_count < MOST_METHODS)
+            add_model(s, own.gl_pathv[s->model_count]);
     for (size_t k = 0; k < s->model_count; k++) {
         const char *slash = strrchr(s->model[k], '/');
         char name[64];
@@ -360,7 +372,7 @@ static bool read_option(suite *s, const char *name, const char *value)
     else if (strcmp(name, "--methods") == 0)
         s->only_methods = value;
     else if (strcmp(name, "--model") == 0 && s->model_count < MOST_METHODS)
-        s->model[s->model_count++] = value;
+        add_model(s, value);
     else if (strcmp(name, "--frames") == 0)
         return (s->frames = strtol(value, NULL, 10)) > 0;
     else if (strcmp(name, "--minutes") == 0)
