@@ -5,8 +5,8 @@
  *             [--model FILE]... [--frames N] [--minutes M] [--budget SECONDS] [--jobs N]
  *
  * The whole may take M minutes on idle cores. A cell may use four times its part of the time that is left,
- * since most end early. Scenes of few frames come first, so the long ones get nearly all of it; in a scene
- * the methods at the end of the table, which are cheap, and models given.
+ * since most end early, the last ones a third of it. Scenes of few frames come first, so the long ones get
+ * nearly all; in a scene the methods at the end of the table, which are cheap, and models given.
  */
 #define _DEFAULT_SOURCE /* MAP_ANONYMOUS, getloadavg */
 #include <glob.h>
@@ -139,7 +139,8 @@ static double share(const suite *s, const board *b)
 {
     const size_t cells = s->scene_count * s->method_count - atomic_load(&b->ended);
     const double left = 60.0 * s->minutes * s->jobs - 1e-6 * (double)atomic_load(&b->spent);
-    return s->budget > 0.0 ? s->budget : left / fmax(s->jobs, 0.25 * (double)cells);
+    return s->budget > 0.0 ? s->budget
+                           : left / fmax(0.25 * (double)cells, fmin((double)cells, 3.0 * s->jobs));
 }
 
 static void run_cell(const suite *s, board *b, size_t i, size_t j)
