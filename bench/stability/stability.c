@@ -247,10 +247,10 @@ static void write_markdown(FILE *f, const suite *s, const board *b)
     (void)strftime(date, sizeof date, "%Y-%m-%d", gmtime(&now));
     cpu_name(cpu, sizeof cpu);
     fprintf(f,
-            "<!-- matrix begins -->\n%s run of %s, %s, %d processes of one thread, load %.1f: %.1f "
+            "<!-- matrix begins -->\n%s run of %s, %s, %d process%s of one thread, load %.1f: %.1f "
             "minutes of CPU time, of ",
-            s->quick ? "The quick" : "The full", date, cpu, s->jobs, load[0],
-            1e-6 / 60.0 * (double)atomic_load(&b->spent));
+            s->quick ? "The quick" : "The full", date, cpu, s->jobs, s->jobs > 1 ? "es" : "",
+            load[0], 1e-6 / 60.0 * (double)atomic_load(&b->spent));
     if (s->budget > 0.0)
         fprintf(f, "%.0f s for each cell.\n\n", s->budget);
     else
