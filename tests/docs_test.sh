@@ -1,5 +1,6 @@
 #!/bin/sh
-# The C in README.md and docs/getting-started.md compiles; prints TAP. SPDX-License-Identifier: MIT
+# The C in README.md and docs/getting-started.md compiles, that of other pages is what the tests run;
+# prints TAP. SPDX-License-Identifier: MIT
 cd "$(dirname "$0")/.." || exit 1
 folder=$(mktemp -d) || exit 1
 trap 'rm -rf "$folder"' EXIT
@@ -20,6 +21,20 @@ for page in README.md docs/getting-started.md; do
     else
         echo "not ok $number - the code in $page compiles"
         sed 's/^/# /' "$folder/err"
+        failed=1
+    fi
+done
+# What a newcomer copies is short, and is in a file that the tests build and run.
+for pair in docs/measures.md:tests/test_eval.c docs/stability.md:bench/stability/scenes.c; do
+    number=$((number + 1))
+    page=${pair%%:*}
+    sed -n '/^```c$/,/^```$/p' "$page" | grep -v '^```' >"$folder/shown"
+    if [ -s "$folder/shown" ] && [ "$(wc -l <"$folder/shown")" -lt 20 ] &&
+        awk 'NR == FNR { shown = shown $0 "\n"; next } { text = text $0 "\n" }
+             END { exit !index(text, shown) }' "$folder/shown" "${pair#*:}"; then
+        echo "ok $number - the code in $page is in ${pair#*:}, in less than 20 lines"
+    else
+        echo "not ok $number - the code in $page is in ${pair#*:}, in less than 20 lines"
         failed=1
     fi
 done

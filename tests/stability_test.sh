@@ -33,15 +33,19 @@ END
 "$stability" --quick --budget 60 --frames 8 --docs docs --methods 'SPH;ballistic' \
     --scenes 'dam break;jet at a sheet' >out 2>err
 holds 'the suite runs' [ $? -eq 0 ]
-holds 'SPH holds a dam break for eight frames' grep -qE '^dam break +SPH .* pass \(8\)' out
-holds 'SPH holds a jet at one layer of wall' grep -qE '^jet at a sheet +SPH .* pass \(8\)' out
+holds 'SPH holds a dam break for eight frames' grep -qE '^dam break +SPH .* pass: 8 of 8' out
+holds 'SPH holds a jet at one layer of wall' grep -qE '^jet at a sheet +SPH .* pass: 8 of 8' out
 holds 'free flight is seen to go through it' grep -qE '^jet at a sheet +ballistic .* through' out
 holds 'the matrix replaces the old one, and nothing else' sh -c '
     [ "$(head -n 1 docs/stability.md)" = before ] && [ "$(tail -n 1 docs/stability.md)" = after ] &&
-        ! grep -q old docs/stability.md && grep -q "| dam break | \*\*pass (8)\*\* |" docs/stability.md'
+        ! grep -q old docs/stability.md && grep -q "| dam break | \*\*pass: 8 of 8\*\* |" docs/stability.md'
 holds 'the picture is whole' sh -c 'tail -n 1 docs/figures/stability.svg | grep -qF "</svg>"'
 "$stability" --quick --budget 0.000001 --methods SPH --scenes 'still column' --jobs 1 >out 2>err
 holds 'a cell out of time does not pass' grep -q 'no failure in 0 of' out
+"$stability" --quick --frames 2 --methods none --model demo --model some/where.safetensors \
+    --scenes 'single particle' --jobs 1 >out 2>err
+holds 'a model file is a method more' grep -qE '^single particle +demo .* pass: 2 of 2' out
+holds 'a file that is not there fails its cells' grep -qE '^single particle +where .* frame 0 of 2: model' out
 "$stability" --scenes nowhere >out 2>err
 holds 'a scene that is not there is an error' [ $? -eq 1 ]
 echo "1..$number"

@@ -19,50 +19,20 @@
 
 /* ---- A method of one's own: the fluid stays where it is (docs/measures.md shows this) --------- */
 
-typedef struct frozen {
-    size_t size;
-    double position[];
-} frozen;
+static void frozen_frame(ascc_plain *fluid)
+{
+    for (size_t i = 0; i < fluid->count; i++)
+        fluid->velocity[i] = 0.0;
+}
 
 static bool frozen_open(const char *settings, const ascc_method_scene *scene, void **state,
                         ascc_method_error *error)
 {
-    const size_t size = scene->fluid_count * (size_t)scene->dimension * sizeof(double);
-    frozen *f = malloc(sizeof *f + size);
-    (void)settings, (void)error;
-    if (f)
-        f->size = size;
-    return (*state = f) != NULL;
-}
-
-static bool frozen_set(void *state, const double *position, const double *velocity,
-                       ascc_velocity_kind kind, ascc_method_error *error)
-{
-    (void)velocity, (void)kind, (void)error;
-    memcpy(((frozen *)state)->position, position, ((frozen *)state)->size);
-    return true;
-}
-
-static bool frozen_advance(void *state, ascc_method_error *error)
-{
-    return state && error;
-}
-
-static void frozen_read(const void *state, double *position, double *velocity)
-{
-    memcpy(position, ((const frozen *)state)->position, ((const frozen *)state)->size);
-    memset(velocity, 0, ((const frozen *)state)->size);
+    return ascc_plain_open(frozen_frame, settings, scene, state, error);
 }
 
 static const ascc_method method_frozen = {
-    .prefix = "frozen",
-    .help = "frozen         nothing moves",
-    .open = frozen_open,
-    .set = frozen_set,
-    .advance = frozen_advance,
-    .read = frozen_read,
-    .close = free,
-};
+    .prefix = "frozen", .help = "frozen         nothing moves", .open = frozen_open, ASCC_PLAIN};
 
 /* ---- Methods that fail ----------------------------------------------------------------------- */
 
@@ -75,24 +45,24 @@ static bool broken_advance(void *state, ascc_method_error *error)
 
 static void lost_read(const void *state, double *position, double *velocity)
 {
-    frozen_read(state, position, velocity);
+    ascc_plain_read(state, position, velocity);
     position[3] = NAN;
 }
 
 static const ascc_method method_broken = {.prefix = "broken",
                                           .help = "",
                                           .open = frozen_open,
-                                          .set = frozen_set,
+                                          .set = ascc_plain_set,
                                           .advance = broken_advance,
-                                          .read = frozen_read,
-                                          .close = free};
+                                          .read = ascc_plain_read,
+                                          .close = ascc_plain_close};
 static const ascc_method method_lost = {.prefix = "lost",
                                         .help = "",
                                         .open = frozen_open,
-                                        .set = frozen_set,
-                                        .advance = frozen_advance,
+                                        .set = ascc_plain_set,
+                                        .advance = ascc_plain_advance,
                                         .read = lost_read,
-                                        .close = free};
+                                        .close = ascc_plain_close};
 
 const ascc_method *const ascc_methods[] = {&ascc_method_ballistic,
                                            &ascc_method_sph,
@@ -255,7 +225,8 @@ static void a_method_of_ones_own_is_measured(void **state)
  * velocity is moved back half a step for that, see method_pbf.c. */
 static void reference_solvers_fly_freely(void **state)
 {
-    static const char *const methods[] = {"sph:cs=20", "pbf:", "pbf:iterations=2,substeps=3"};
+    static const char *const methods[] = {"sph:cs=20", "sph:cs=20,contact=-1,coarse=1.5",
+                                          "pbf:", "pbf:iterations=2,substeps=3"};
     (void)state;
     for (size_t k = 0; k < sizeof methods / sizeof *methods; k++) {
         assert_int_equal(evaluate(methods[k], "test_eval.json", "--frames", "0:20:10"), 0);

@@ -1,9 +1,9 @@
 /* Cost against accuracy of every method on true sequences, as one CSV file.
  * SPDX-License-Identifier: MIT
  *
- *   chart SHARED OUT.csv
+ *   chart SHARED OUT.csv [FILE...]
  *
- * A method or a sequence more is a line in the tables below. What is not there is left out with a line.
+ * FILEs are models, one point each, called by their names. A method or a sequence more is a line in the tables below. What is not there is left out with a line.
  */
 #include <math.h>
 #include <stdio.h>
@@ -14,7 +14,7 @@
 
 #include "evaluate.h"
 
-enum { REPEATS = 5, TIMED = 2, START = 40, MOST_ROWS = 256 };
+enum { REPEATS = 5, TIMED = 2, START = 40, MOST_ROWS = 256, MOST_MODELS = 64 };
 
 /* Family (a colour in the chart), label, method; @ is the folder of shared data. */
 static const char *const methods[][3] = {
@@ -25,8 +25,13 @@ static const char *const methods[][3] = {
     {"SPH", "c 10", "sph:cs=10,contact=-1"},
     {"SPH", "c 20", "sph:cs=20,contact=-1"},
     {"SPH", "c 20, dt/2", "sph:cs=20,contact=-1,courant=0.25"},
+    {"SPH", "c 20, dt x 2", "sph:cs=20,contact=-1,courant=1"},
     {"SPH", "c 20, contact", "sph:cs=20"},
     {"SPH", "c 40", "sph:cs=40,contact=-1"},
+    {"SPH", "c 20, dx x 1.5", "sph:cs=20,contact=-1,coarse=1.5"},
+    {"SPH", "c 20, dx x 2", "sph:cs=20,contact=-1,coarse=2"},
+    {"SPH", "c 20, dx x 2, dt/2", "sph:cs=20,contact=-1,coarse=2,courant=0.25"},
+    {"SPH", "c 20, dx x 3", "sph:cs=20,contact=-1,coarse=3"},
     {"PBF", "1 x 4", "pbf:iterations=4"},
     {"PBF", "1 x 16", "pbf:iterations=16"},
     {"PBF", "4 x 1", "pbf:iterations=1,substeps=4"},
@@ -141,8 +146,10 @@ static bool accuracy(const ascc_truth *t, const ascc_method *method, const char 
     if (good) {
         r->error[0] = figure(run, "err_n2_difference");
         r->error[1] = 0.5 * (figure(run, "chamfer_1s_gt2pred") + figure(run, "chamfer_1s_pred2gt"));
-        r->error[2] = figure(run, "density_mean_error_1s");
-        r->density_max = figure(run, "density_max_error_1s");
+        /* Carried particles (method_coarse.h): nothing keeps them apart or draws them together. */
+        const bool carried = strstr(settings, "coarse=") != NULL;
+        r->error[2] = carried ? NAN : figure(run, "density_mean_error_1s");
+        r->density_max = carried ? NAN : figure(run, "density_max_error_1s");
         r->escaped = figure(run, "escaped_max");
         r->last = figure(run, "last_frame");
         snprintf(r->note, sizeof r->note, "%s", run->note);
@@ -175,8 +182,7 @@ static bool write_csv(const chart *c, const char *path)
           "front_err_n2,front_chamfer,front_density,note\n",
           f);
     for (const row *r = c->rows; r < c->rows + c->count; r++) {
-        const char *name =
-            strncmp(r->method, "@/data/", 7) == 0 ? strrchr(r->method, '/') + 1 : r->method;
+        const char *slash = strrchr(r->method, '/'), *name = slash ? slash + 1 : r->method;
         fprintf(f,
                 "%s,%s,\"%s\",\"%s\",%zu,%.4g,%.4g,%d,%.6g,%.6g,%.6g,%.6g,%g,%g,%d,%d,%d,\"%s\"\n",
                 r->sequence, r->family, r->label, name, r->particles, r->cpu_one, r->wall_all,
@@ -186,38 +192,52 @@ static bool write_csv(const chart *c, const char *path)
     return fclose(f) == 0;
 }
 
-static void measure(chart *c, const ascc_truth *t, const char *sequence, size_t m)
+static void measure(chart *c, const ascc_truth *t, const char *sequence,
+                    const char *const method[3])
 {
     char word[512];
     const char *settings;
     row *r = &c->rows[c->count];
-    expand(c, methods[m][2], word, sizeof word);
-    if (methods[m][2][0] == '@' && access(word, R_OK) != 0) {
+    expand(c, method[2], word, sizeof word);
+    if (strchr(word, '/') && access(word, R_OK) != 0) {
         fprintf(stderr, "chart: no %s: left out\n", word);
         return;
     }
-    const ascc_method *method = ascc_method_find(word, &settings);
-    *r = (row){.sequence = sequence,
-               .family = methods[m][0],
-               .label = methods[m][1],
-               .method = methods[m][2],
-               .particles = t->scene.fluid_count};
-    r->cpu_one = cost(t, method, settings, 1, CLOCK_PROCESS_CPUTIME_ID);
-    r->wall_all = cost(t, method, settings, c->cores, CLOCK_MONOTONIC);
-    if (!accuracy(t, method, settings, r))
+    if (c->count == MOST_ROWS)
         return;
-    fprintf(stderr, "%-10s %-8s %-14s %9.3g us %9.3g us  %.5f m  %.4f m  %.4f\n", sequence,
+    const ascc_method *how = ascc_method_find(word, &settings);
+    *r = (row){.sequence = sequence,
+               .family = method[0],
+               .label = method[1],
+               .method = method[2],
+               .particles = t->scene.fluid_count};
+    r->cpu_one = cost(t, how, settings, 1, CLOCK_PROCESS_CPUTIME_ID);
+    r->wall_all = cost(t, how, settings, c->cores, CLOCK_MONOTONIC);
+    if (!accuracy(t, how, settings, r))
+        return;
+    fprintf(stderr, "%-10s %-8s %-18s %9.3g us %9.3g us  %.5f m  %.4f m  %.4f\n", sequence,
             r->family, r->label, r->cpu_one, r->wall_all, r->error[0], r->error[1], r->error[2]);
     c->count++;
+}
+
+/* "some/folder/name.safetensors" is called "name". */
+static void name_of(const char *path, char *name, size_t capacity)
+{
+    const char *slash = strrchr(path, '/');
+    slash = slash ? slash + 1 : path;
+    snprintf(name, capacity, "%.*s", (int)strcspn(slash, "."), slash);
 }
 
 int main(int argc, char **argv)
 {
     static chart c = {.frames = 52};
-    if (argc < 3) {
-        fprintf(stderr, "usage: chart SHARED OUT.csv\n");
+    static char model[MOST_MODELS][64];
+    if (argc < 3 || argc > 3 + MOST_MODELS) {
+        fprintf(stderr, "usage: chart SHARED OUT.csv [FILE...]\n");
         return 2;
     }
+    for (int k = 3; k < argc; k++)
+        name_of(argv[k], model[k - 3], sizeof model[k - 3]);
     c.shared = argv[1];
     c.cores = (int32_t)sysconf(_SC_NPROCESSORS_ONLN);
     for (size_t s = 0; s < SEQUENCES; s++) {
@@ -230,13 +250,14 @@ int main(int argc, char **argv)
             fprintf(stderr, "chart: %s: left out\n", error.text);
             continue;
         }
-        const char *name = strrchr(path, '/') + 1;
-        snprintf(names[s], sizeof names[s], "%.*s", (int)strcspn(name, "."), name);
+        name_of(path, names[s], sizeof names[s]);
         t.frames = t.frames < c.frames ? t.frames : c.frames;
         if (t.velocity_frames > t.frames)
             t.velocity_frames = t.frames;
         for (size_t m = 0; m < METHODS; m++)
-            measure(&c, &t, names[s], m);
+            measure(&c, &t, names[s], methods[m]);
+        for (int k = 3; k < argc; k++)
+            measure(&c, &t, names[s], (const char *[3]){"network", model[k - 3], argv[k]});
         ascc_truth_free(&t);
     }
     for (row *r = c.rows; r < c.rows + c.count; r++)

@@ -15,8 +15,9 @@ new=$(mktemp) || exit 1
     echo '|---|---|---|---|---|---|---|---|'
     awk 'NR > 1 {
         split($0, q, "\""); split(q[1], a, ","); split(q[5], b, ",")
-        printf "| %s | `%s` | %.3g | %.3g | %.5f m%s | %.4f m%s | %.4f%s | %d |\n", a[1], q[4], b[3],
-            b[4], b[6], b[12] ? " *" : "", b[7], b[13] ? " *" : "", b[8], b[14] ? " *" : "", b[10]
+        density = b[8] ~ /nan/ ? "-" : sprintf("%.4f%s", b[8], b[14] ? " *" : "")
+        printf "| %s | `%s` | %.3g | %.3g | %.5f m%s | %.4f m%s | %s | %d |\n", a[1], q[4], b[3],
+            b[4], b[6], b[12] ? " *" : "", b[7], b[13] ? " *" : "", density, b[10]
     }' "$1"
     sed -n '/<!-- table ends -->/,$p' $doc
 } >"$new" && cat "$new" >$doc

@@ -20,6 +20,16 @@ bool cell_fail(cell *c, const char *format, ...)
     return false;
 }
 
+void cell_say(cell *c, const char *format, ...)
+{
+    va_list arguments;
+    if (c->verdict != PASS)
+        return;
+    va_start(arguments, format);
+    (void)vsnprintf(c->text, sizeof c->text, format, arguments);
+    va_end(arguments);
+}
+
 bool cell_open(cell *c, const world *w, simulation *s)
 {
     ascc_method_error error = {"refused"};
@@ -34,6 +44,30 @@ bool cell_open(cell *c, const world *w, simulation *s)
     if (!c->method->set(s->state, w->position, w->velocity, ASCC_VELOCITY_STORED, &error))
         return cell_fail(c, "%.100s", error.text);
     return true;
+}
+
+bool cell_has_bodies(cell *c)
+{
+    if (c->method->move_body)
+        return true;
+    c->verdict = NONE;
+    snprintf(c->text, sizeof c->text, "no bodies that move");
+    return false;
+}
+
+bool cell_move_body(cell *c, simulation *s, world *w, double mass, double velocity[3])
+{
+    const ascc_method_scene *scene = &w->scene;
+    ascc_method_error error = {"the body cannot be moved"};
+    double impulse[3], by[3];
+    c->method->body_impulse(s->state, impulse);
+    for (int a = 0; a < 3; a++) {
+        velocity[a] += impulse[a] / mass + scene->time_step * scene->gravity[a];
+        by[a] = scene->time_step * velocity[a];
+        for (size_t i = scene->wall_count - scene->body_count; i < scene->wall_count; i++)
+            w->wall[3 * i + (size_t)a] += by[a];
+    }
+    return c->method->move_body(s->state, by, &error) || cell_fail(c, "%.100s", error.text);
 }
 
 void cell_close(cell *c, simulation *s)
@@ -102,6 +136,19 @@ bool cell_nothing_clumps(cell *c, const simulation *s)
     (void)ascc_measure_pairs(&set, s->world->scene.spacing, 1, &pairs);
     return !(pairs.tight_fraction > 0.001) ||
            cell_fail(c, "%.2g %% of pairs < spacing / 5", 100.0 * pairs.tight_fraction);
+}
+
+double cell_density(const simulation *s)
+{
+    const ascc_measure_set set = set_of(s);
+    double sum = 0.0, *density = calloc(set.count + 1, sizeof *density);
+    if (!density ||
+        ascc_measure_density(&set, 0, NULL, 2.0 * s->world->scene.spacing, 1, density) != ASCC_OK)
+        sum = NAN;
+    for (size_t i = 0; i < set.count && density; i++)
+        sum += density[i];
+    free(density);
+    return sum / (double)set.count / ascc_measure_rest_density(3);
 }
 
 bool cell_slower_than(cell *c, const simulation *s, double speed)

@@ -6,7 +6,12 @@
 #include "measures.h"
 #include "world.h"
 
-typedef enum verdict { PASS = 0, FAIL = 1, CUT = 2 /* no failure until the time was up */ } verdict;
+typedef enum verdict {
+    PASS = 0,
+    FAIL = 1,
+    CUT = 2, /* no failure until the time was up */
+    NONE = 3 /* the method does not do what the scene asks */
+} verdict;
 
 typedef struct cell {
     const ascc_method *method;
@@ -15,7 +20,7 @@ typedef struct cell {
     long frame;           /* run: of the longest simulation of the scene */
     double budget, start; /* CPU seconds */
     verdict verdict;
-    char text[128]; /* why it failed */
+    char text[128]; /* why it failed, or a remark on a pass */
 } cell;
 
 /* A running simulation of a world, which must outlive it. */
@@ -33,8 +38,20 @@ bool cell_fail(cell *c, const char *format, ...)
 #endif
     ;
 
+/* A remark that stands behind a pass. */
+void cell_say(cell *c, const char *format, ...)
+#if defined(__GNUC__)
+    __attribute__((format(printf, 2, 3)))
+#endif
+    ;
+
 /* False: the method refused the world, and the cell has failed. Close either way. */
 bool cell_open(cell *c, const world *w, simulation *s);
+/* False: the method moves no bodies, and the cell says so. */
+bool cell_has_bodies(cell *c);
+/* The body of the world at its mass, kg, for a frame: what the fluid gave it in the last one and gravity.
+ * Moves its wall points in the world as well. */
+bool cell_move_body(cell *c, simulation *s, world *w, double mass, double velocity[3]);
 /* One frame. False: the cell has failed (a step that fails, a number that is not finite), has run all
  * its frames, or is out of time. */
 bool cell_step(cell *c, simulation *s);
@@ -47,6 +64,8 @@ ascc_measure_motion_sums cell_motion(const simulation *s);
 bool cell_nothing_escapes(cell *c, const simulation *s);
 /* At most one in 1,000 pairs nearer than a fifth of the spacing. */
 bool cell_nothing_clumps(cell *c, const simulation *s);
+/* Mean density of the fluid by the poly6 window, of rest density. */
+double cell_density(const simulation *s);
 bool cell_slower_than(cell *c, const simulation *s, double speed);
 
 #endif

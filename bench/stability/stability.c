@@ -1,10 +1,15 @@
 /* Every method in every scene where methods fail: a matrix of pass, or when and how it failed.
  * SPDX-License-Identifier: MIT
  *
- *   stability [--quick] [--shared DIR] [--docs DIR] [--scenes 'A;B'] [--methods 'A;B'] [--frames N]
- *             [--budget SECONDS] [--jobs N]
+ *   stability [--quick] [--shared DIR] [--docs DIR] [--scenes 'A;B'] [--methods 'A;B']
+ *             [--model FILE]... [--frames N] [--minutes M] [--budget SECONDS] [--jobs N]
+ *
+ * The whole may take M minutes on idle cores. A cell may use four times its part of the time that is left,
+ * since most end early, the last ones a third of it. Scenes of few frames come first, so the long ones get
+ * nearly all; in a scene the methods at the end of the table, which are cheap, and models given.
  */
 #define _DEFAULT_SOURCE /* MAP_ANONYMOUS, getloadavg */
+#include <glob.h>
 #include <math.h>
 #include <stdatomic.h>
 #include <stdio.h>
@@ -35,17 +40,20 @@ typedef struct suite {
     const char *shared, *docs, *only_scenes, *only_methods;
     bool quick;
     long frames;
-    double budget;
+    double minutes; /* of all processes together, idle cores */
+    double budget;  /* CPU seconds of every cell instead, or 0 */
     int jobs;
-    size_t scene_count, method_count;
+    size_t scene_count, method_count, model_count;
+    size_t order[MOST_SCENES]; /* scenes, those of few frames first */
     const stability_scene *scene[MOST_SCENES];
-    const char *method[MOST_METHODS];
-    char words[MOST_METHODS][512];
+    const char *method[MOST_METHODS], *model[MOST_METHODS];
+    char words[MOST_METHODS][512], names[MOST_METHODS][64];
 } suite;
 
 /* What the processes share. */
 typedef struct board {
-    atomic_size_t next;
+    atomic_size_t next, ended;
+    atomic_llong spent; /* CPU microseconds of the cells that ended */
     cell cells[MOST_SCENES][MOST_METHODS];
     double seconds[MOST_SCENES][MOST_METHODS];
 } board;
@@ -61,52 +69,104 @@ static bool listed(const char *list, const char *name)
     return !list;
 }
 
-static void choose(suite *s)
+static long frames_of(const suite *s, const stability_scene *scene)
 {
-    for (const stability_scene *scene = stability_scenes; scene->name; scene++)
-        if (s->scene_count < MOST_SCENES && listed(s->only_scenes, scene->name))
-            s->scene[s->scene_count++] = scene;
+    return s->frames > 0 ? s->frames : s->quick ? scene->quick : scene->full;
+}
+
+static void choose_scenes(suite *s)
+{
+    for (const stability_scene *scene = stability_scenes; scene->name; scene++) {
+        size_t k = s->scene_count;
+        if (k == MOST_SCENES || !listed(s->only_scenes, scene->name))
+            continue;
+        s->scene[s->scene_count++] = scene;
+        for (; k > 0 && frames_of(s, s->scene[s->order[k - 1]]) > frames_of(s, scene); k--)
+            s->order[k] = s->order[k - 1];
+        s->order[k] = s->scene_count - 1;
+    }
+}
+
+static void add_method(suite *s, const char *name, const char *word)
+{
+    char *into = s->words[s->method_count];
+    if (s->method_count == MOST_METHODS)
+        return;
+    snprintf(into, sizeof *s->words, "%s", word);
+    snprintf(s->names[s->method_count], sizeof *s->names, "%s", name);
+    s->method[s->method_count] = s->names[s->method_count];
+    s->method_count++;
+}
+
+static void add_model(suite *s, const char *path)
+{
+    s->model[s->model_count++] = path;
+}
+
+/* Files given with --model run whatever --methods names; "some/folder/name.safetensors" is `name`. */
+static void choose_methods(suite *s)
+{
     for (size_t m = 0; m < METHODS; m++) {
-        char *word = s->words[s->method_count];
+        const bool shared = methods[m][1][0] == '@';
+        char path[512];
+        snprintf(path, sizeof path, "%s%s", s->shared, methods[m][1] + 1);
         if (!listed(s->only_methods, methods[m][0]))
             continue;
-        if (methods[m][1][0] == '@')
-            snprintf(word, sizeof *s->words, "%s%s", s->shared, methods[m][1] + 1);
+        if (shared && access(path, R_OK) != 0)
+            fprintf(stderr, "stability: %s: no %s, left out\n", methods[m][0], path);
         else
-            snprintf(word, sizeof *s->words, "%s", methods[m][1]);
-        if (methods[m][1][0] == '@' && access(word, R_OK) != 0) {
-            fprintf(stderr, "stability: %s: no %s, left out\n", methods[m][0], word);
-            continue;
-        }
-        s->method[s->method_count++] = methods[m][0];
+            add_method(s, methods[m][0], shared ? path : methods[m][1]);
+    }
+    /* The project's own models, as the chart has them; kept until the end. */
+    static glob_t own;
+    if (!s->only_methods && !s->model_count &&
+        glob("examples/models/*.safetensors", 0, NULL, &own) == 0)
+        while (s->model_count < own.gl_pathc && s->model_count < MOST_METHODS)
+            add_model(s, own.gl_pathv[s->model_count]);
+    for (size_t k = 0; k < s->model_count; k++) {
+        const char *slash = strrchr(s->model[k], '/');
+        char name[64];
+        snprintf(name, sizeof name, "%s", slash ? slash + 1 : s->model[k]);
+        name[strcspn(name, ".")] = 0;
+        add_method(s, name, s->model[k]);
     }
 }
 
 /* ---- Running --------------------------------------------------------------------------------- */
 
-static void run_cell(const suite *s, board *b, size_t k)
+/* CPU seconds for the next cell. */
+static double share(const suite *s, const board *b)
 {
-    const size_t i = k / s->method_count, j = k % s->method_count;
-    const stability_scene *scene = s->scene[i];
+    const size_t cells = s->scene_count * s->method_count - atomic_load(&b->ended);
+    const double left = 60.0 * s->minutes * s->jobs - 1e-6 * (double)atomic_load(&b->spent);
+    return s->budget > 0.0 ? s->budget
+                           : left / fmax(0.25 * (double)cells, fmin((double)cells, 3.0 * s->jobs));
+}
+
+static void run_cell(const suite *s, board *b, size_t i, size_t j)
+{
     cell *c = &b->cells[i][j];
-    *c = (cell){.frames = s->frames > 0 ? s->frames
-                          : s->quick    ? scene->quick
-                                        : scene->full,
-                .budget = s->budget,
+    *c = (cell){.frames = frames_of(s, s->scene[i]),
+                .budget = share(s, b),
                 .start = (double)clock() / CLOCKS_PER_SEC};
     c->method = ascc_method_find(s->words[j], &c->settings);
-    scene->run(c);
+    s->scene[i]->run(c);
     b->seconds[i][j] = (double)clock() / CLOCKS_PER_SEC - c->start;
+    atomic_fetch_add(&b->spent, (long long)(1e6 * b->seconds[i][j]));
+    atomic_fetch_add(&b->ended, 1);
 }
 
 static void verdict_text(const cell *c, char *text, size_t capacity)
 {
     if (c->verdict == FAIL)
-        snprintf(text, capacity, "frame %ld: %s", c->frame, c->text);
+        snprintf(text, capacity, "frame %ld of %ld: %s", c->frame, c->frames, c->text);
     else if (c->verdict == CUT)
         snprintf(text, capacity, "no failure in %ld of %ld", c->frame, c->frames);
+    else if (c->verdict == NONE)
+        snprintf(text, capacity, "%s", c->text);
     else
-        snprintf(text, capacity, "pass (%ld)", c->frame);
+        snprintf(text, capacity, "pass: %ld of %ld%s%s", c->frame, c->frames,
+                 c->text[0] ? ", " : "", c->text);
 }
 
 static void work(const suite *s, board *b)
@@ -114,8 +174,9 @@ static void work(const suite *s, board *b)
     const size_t count = s->scene_count * s->method_count;
     for (size_t k; (k = atomic_fetch_add(&b->next, 1)) < count;) {
         char text[256];
-        const size_t i = k / s->method_count, j = k % s->method_count;
-        run_cell(s, b, k);
+        const size_t i = s->order[k / s->method_count];
+        const size_t j = s->method_count - 1 - k % s->method_count;
+        run_cell(s, b, i, j);
         verdict_text(&b->cells[i][j], text, sizeof text);
         printf("%-18s %-14s %6.1f s  %s\n", s->scene[i]->name, s->method[j], b->seconds[i][j],
                text);
@@ -186,9 +247,14 @@ static void write_markdown(FILE *f, const suite *s, const board *b)
     (void)strftime(date, sizeof date, "%Y-%m-%d", gmtime(&now));
     cpu_name(cpu, sizeof cpu);
     fprintf(f,
-            "<!-- matrix begins -->\n%s run of %s, %s, %d processes of one thread, load %.1f. A "
-            "cell was given %.0f s of CPU time.\n\n",
-            s->quick ? "The quick" : "The full", date, cpu, s->jobs, load[0], s->budget);
+            "<!-- matrix begins -->\n%s run of %s, %s, %d process%s of one thread, load %.1f: %.1f "
+            "minutes of CPU time, of ",
+            s->quick ? "The quick" : "The full", date, cpu, s->jobs, s->jobs > 1 ? "es" : "",
+            load[0], 1e-6 / 60.0 * (double)atomic_load(&b->spent));
+    if (s->budget > 0.0)
+        fprintf(f, "%.0f s for each cell.\n\n", s->budget);
+    else
+        fprintf(f, "%.0f that it may take.\n\n", s->minutes * s->jobs);
     write_table(f, s, b);
     fputs("\n| scene | passes when | frames, quick | full |\n|---|---|---|---|\n", f);
     for (size_t i = 0; i < s->scene_count; i++)
@@ -219,7 +285,7 @@ static void svg_text(FILE *f, int x, int y, const char *style, const char *text,
 static void write_svg(FILE *f, const suite *s, const board *b)
 {
     enum { WIDE = 190, HIGH = 38, LEFT = 140, TOP = 34 };
-    static const char *const colour[] = {"#b7e1b0", "#f4b6ae", "#f7e6a4"};
+    static const char *const colour[] = {"#b7e1b0", "#f4b6ae", "#f7e6a4", "#e4e4e4"};
     const int width = LEFT + WIDE * (int)s->method_count + 10,
               height = TOP + HIGH * (int)s->scene_count + 34;
     fprintf(f,
@@ -242,13 +308,15 @@ static void write_svg(FILE *f, const suite *s, const board *b)
                     "<rect x=\"%d\" y=\"%d\" width=\"%d\" height=\"%d\" rx=\"3\" fill=\"%s\"/>\n",
                     x + 1, y + 1, WIDE - 2, HIGH - 2, colour[c->verdict]);
             if (c->verdict == FAIL)
-                snprintf(first, sizeof first, "failed in frame %ld", c->frame);
+                snprintf(first, sizeof first, "failed: frame %ld of %ld", c->frame, c->frames);
             else if (c->verdict == CUT)
                 snprintf(first, sizeof first, "out of time, no failure");
+            else if (c->verdict == NONE)
+                snprintf(first, sizeof first, "not asked");
             else
                 snprintf(first, sizeof first, "pass");
             svg_text(f, x + 7, y + 16, c->verdict == PASS ? "font-weight=\"bold\"" : "", first, 40);
-            if (c->verdict == FAIL)
+            if (c->verdict == FAIL || c->verdict == NONE)
                 snprintf(first, sizeof first, "%.60s", c->text);
             else
                 snprintf(first, sizeof first, "%ld of %ld frames", c->frame, c->frames);
@@ -304,8 +372,12 @@ static bool read_option(suite *s, const char *name, const char *value)
         s->only_scenes = value;
     else if (strcmp(name, "--methods") == 0)
         s->only_methods = value;
+    else if (strcmp(name, "--model") == 0 && s->model_count < MOST_METHODS)
+        add_model(s, value);
     else if (strcmp(name, "--frames") == 0)
         return (s->frames = strtol(value, NULL, 10)) > 0;
+    else if (strcmp(name, "--minutes") == 0)
+        return (s->minutes = strtod(value, NULL)) > 0.0;
     else if (strcmp(name, "--budget") == 0)
         return (s->budget = strtod(value, NULL)) > 0.0;
     else if (strcmp(name, "--jobs") == 0)
@@ -325,16 +397,19 @@ int main(int argc, char **argv)
             continue;
         }
         if (i + 1 == argc || !read_option(&s, argv[i], argv[i + 1])) {
-            fputs("usage: stability [--quick] [--shared DIR] [--docs DIR] [--scenes 'A;B']\n"
-                  "                 [--methods 'A;B'] [--frames N] [--budget SECONDS] [--jobs N]\n",
-                  stderr);
+            fputs(
+                "usage: stability [--quick] [--shared DIR] [--docs DIR] [--scenes 'A;B']\n"
+                "                 [--methods 'A;B'] [--model FILE]... [--frames N] [--minutes M]\n"
+                "                 [--budget SECONDS] [--jobs N]\n",
+                stderr);
             return 2;
         }
         i++;
     }
-    if (!(s.budget > 0.0))
-        s.budget = s.quick ? 3.0 : 60.0;
-    choose(&s);
+    if (!(s.minutes > 0.0))
+        s.minutes = s.quick ? 2.5 : 55.0;
+    choose_scenes(&s);
+    choose_methods(&s);
     board *b = mmap(NULL, sizeof *b, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
     if (b == MAP_FAILED || s.scene_count == 0 || s.method_count == 0) {
         fputs("stability: nothing to run, or no memory\n", stderr);

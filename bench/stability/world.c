@@ -71,22 +71,82 @@ static void add_wall(world *w, const double position[3], const double normal[3])
     refer(w);
 }
 
+/* Both sides of the box across an axis. */
+static void add_sides(world *w, const double edges[3], int axis)
+{
+    const int p = (axis + 1) % 3, q = (axis + 2) % 3;
+    const int m = (int)ceil(edges[p] / WALL_SPACING), n = (int)ceil(edges[q] / WALL_SPACING);
+    for (int side = 0; side < 2; side++)
+        for (int j = 0; j < m; j++)
+            for (int k = 0; k < n; k++) {
+                double x[3], normal[3] = {0.0, 0.0, 0.0};
+                x[axis] = side * edges[axis] * w->scene.spacing;
+                x[p] = (j + 0.5) * edges[p] * w->scene.spacing / m;
+                x[q] = (k + 0.5) * edges[q] * w->scene.spacing / n;
+                normal[axis] = side ? -1.0 : 1.0;
+                add_wall(w, x, normal);
+            }
+}
+
 void world_box(world *w, const int edges[3])
 {
-    for (int axis = 0; axis < 3; axis++) {
-        const int p = (axis + 1) % 3, q = (axis + 2) % 3;
-        const int m = (int)ceil(edges[p] / WALL_SPACING), n = (int)ceil(edges[q] / WALL_SPACING);
-        for (int side = 0; side < 2; side++)
+    for (int axis = 0; axis < 3; axis++)
+        add_sides(w, (double[]){edges[0], edges[1], edges[2]}, axis);
+}
+
+void world_tube(world *w, const double edges[3])
+{
+    add_sides(w, edges, 1);
+    add_sides(w, edges, 2);
+}
+
+void world_wedge(world *w, double middle, double half, double height, double depth)
+{
+    const double s = w->scene.spacing, slope = hypot(half, height);
+    const int m = (int)ceil(slope / WALL_SPACING), n = (int)ceil(depth / WALL_SPACING);
+    for (int side = -1; side <= 1; side += 2)
+        for (int j = 0; j < m; j++)
+            for (int k = 0; k < n; k++) {
+                const double down = (j + 0.5) / m;
+                const double x[3] = {(middle + side * down * half) * s, (1.0 - down) * height * s,
+                                     (k + 0.5) * depth / n * s};
+                add_wall(w, x, (double[]){side * height / slope, half / slope, 0.0});
+            }
+}
+
+static void take_out(world *w, const double center[3], double half)
+{
+    size_t kept = 0;
+    for (size_t i = 0; i < w->scene.fluid_count; i++) {
+        const double *x = w->position + 3 * i;
+        if (fabs(x[0] - center[0]) < half && fabs(x[1] - center[1]) < half &&
+            fabs(x[2] - center[2]) < half)
+            continue;
+        memmove(w->position + 3 * kept, x, 3 * sizeof(double));
+        memmove(w->velocity + 3 * kept, w->velocity + 3 * i, 3 * sizeof(double));
+        kept++;
+    }
+    w->scene.fluid_count = kept;
+}
+
+void world_body(world *w, const double center[3], double edge)
+{
+    const double s = w->scene.spacing;
+    const int m = (int)ceil(edge / WALL_SPACING);
+    const size_t walls = w->scene.wall_count;
+    for (int axis = 0; axis < 3; axis++)
+        for (int side = -1; side <= 1; side += 2)
             for (int j = 0; j < m; j++)
-                for (int k = 0; k < n; k++) {
+                for (int k = 0; k < m; k++) {
                     double x[3], normal[3] = {0.0, 0.0, 0.0};
-                    x[axis] = side * edges[axis] * w->scene.spacing;
-                    x[p] = (j + 0.5) * edges[p] * w->scene.spacing / m;
-                    x[q] = (k + 0.5) * edges[q] * w->scene.spacing / n;
-                    normal[axis] = side ? -1.0 : 1.0;
+                    x[axis] = center[axis] + 0.5 * side * edge * s;
+                    x[(axis + 1) % 3] = center[(axis + 1) % 3] + ((j + 0.5) / m - 0.5) * edge * s;
+                    x[(axis + 2) % 3] = center[(axis + 2) % 3] + ((k + 0.5) / m - 0.5) * edge * s;
+                    normal[axis] = side;
                     add_wall(w, x, normal);
                 }
-    }
+    w->scene.body_count = w->scene.wall_count - walls;
+    take_out(w, center, (0.5 * edge + 0.99) * s);
 }
 
 static double *duplicate(const double *array, size_t rows)

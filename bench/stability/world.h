@@ -23,6 +23,14 @@ void world_sheet(world *w, double half);
 
 /* The walls of a closed box from the origin, its edges so many spacings. */
 void world_box(world *w, const int edges[3]);
+/* The same without its two sides across x. */
+void world_tube(world *w, const double edges[3]);
+/* A wedge on the floor, its edge along z: where its middle is, half its width at the floor, its height
+ * and length, in spacings. */
+void world_wedge(world *w, double middle, double half, double height, double depth);
+
+/* A cube in the fluid that may move, its edge in spacings: fluid nearer than a spacing is taken out. */
+void world_body(world *w, const double center[3], double edge);
 
 /* Turned world: y becomes x, z becomes y, x becomes z. Upside down: y becomes -y. On one row of three
  * numbers and on a whole world; back undoes. */

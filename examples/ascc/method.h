@@ -1,7 +1,8 @@
 /* What `ascc eval` and the charts run: any way to advance a fluid by one frame.
  * SPDX-License-Identifier: MIT
  *
- * A new method is one ascc_method in a file of its own, a declaration below, and a line in methods.c. Positions and velocities are packed double[fluid_count][dimension], SI units.
+ * A new method is one ascc_method in a file of its own, a declaration below, and a line in methods.c.
+ * Positions and velocities are packed double[fluid_count][dimension], SI units.
  */
 #ifndef ASCC_METHOD_H
 #define ASCC_METHOD_H
@@ -28,6 +29,7 @@ typedef struct ascc_method_scene {
     size_t fluid_count, wall_count;
     const double *wall, *normal; /* [wall_count][dimension] */
     size_t first_layer;          /* wall points that touch the fluid: the first so many */
+    size_t body_count;           /* wall points of a body that moves: the last so many */
 } ascc_method_scene;
 
 /** Why a method failed. */
@@ -51,8 +53,40 @@ typedef struct ascc_method {
     /* Momentum that gravity gave to the fluid and that the fluid gave to walls in the last frame, kg
      * m/s; NULL if the method cannot tell. */
     void (*impulses)(const void *state, double external[3], double wall[3]);
+    /* Moves the scene's body before the next frame, and tells what the fluid gave to it in the last one,
+     * kg m/s; NULL if the method has no such bodies. */
+    bool (*move_body)(void *state, const double by[3], ascc_method_error *error);
+    void (*body_impulse)(const void *state, double impulse[3]);
     void (*close)(void *state);
 } ascc_method;
+
+/* ---- The short way: a method that needs no more state than its fluid ------------------------- */
+
+/** The fluid of such a method. */
+typedef struct ascc_plain {
+    const ascc_method_scene *scene;
+    const char *settings;    /* what follows the prefix */
+    ascc_velocity_kind kind; /* of the velocities it was set with */
+    size_t count;            /* numbers in each of the two: fluid_count * dimension */
+    double *position, *velocity;
+    void (*frame)(struct ascc_plain *fluid);
+} ascc_plain;
+
+/** For the method's `open`: `frame` moves the fluid by scene->time_step. */
+bool ascc_plain_open(void (*frame)(ascc_plain *fluid), const char *settings,
+                     const ascc_method_scene *scene, void **state, ascc_method_error *error);
+bool ascc_plain_set(void *state, const double *position, const double *velocity,
+                    ascc_velocity_kind kind, ascc_method_error *error);
+bool ascc_plain_advance(void *state, ascc_method_error *error);
+void ascc_plain_read(const void *state, double *position, double *velocity);
+void ascc_plain_close(void *state);
+
+/** All that is left of such an ascc_method behind .open. */
+#define ASCC_PLAIN                                                                                 \
+    .set = ascc_plain_set, .advance = ascc_plain_advance, .read = ascc_plain_read,                 \
+    .close = ascc_plain_close
+
+/* ---- All of them ----------------------------------------------------------------------------- */
 
 /** All methods, NULL at the end: a word means the first whose prefix it begins with. */
 extern const ascc_method *const ascc_methods[];

@@ -77,17 +77,30 @@ static bool learned_open(const char *settings, const ascc_method_scene *scene, v
     return true;
 }
 
+enum { WALLS = 0, BODY = 1 };
+
+static ascc_status add_walls(learned *m, size_t first, size_t end, int32_t body)
+{
+    const size_t d = (size_t)m->scene->dimension;
+    const ascc_const_array wall = {.data = m->scene->wall + first * d, .scalar = ASCC_DOUBLE};
+    const ascc_const_array normal = {.data = m->scene->normal + first * d, .scalar = ASCC_DOUBLE};
+    if (first == end)
+        return ASCC_OK;
+    return ascc_particles_add_boundary(m->particles, end - first, &wall, &normal, body, NULL);
+}
+
 static ascc_status learned_fill(learned *m, const double *position, const double *velocity)
 {
     const ascc_const_array x = {.data = position, .scalar = ASCC_DOUBLE};
     const ascc_const_array v = {.data = velocity, .scalar = ASCC_DOUBLE};
-    const ascc_const_array wall = {.data = m->scene->wall, .scalar = ASCC_DOUBLE};
-    const ascc_const_array normal = {.data = m->scene->normal, .scalar = ASCC_DOUBLE};
-    const ascc_status status =
+    const size_t body = m->scene->wall_count - m->scene->body_count;
+    ascc_status status =
         ascc_particles_add_fluid(m->particles, m->scene->fluid_count, &x, &v, NULL, NULL);
-    if (status != ASCC_OK || !m->scene->wall_count)
-        return status;
-    return ascc_particles_add_boundary(m->particles, m->scene->wall_count, &wall, &normal, 0, NULL);
+    if (status == ASCC_OK)
+        status = add_walls(m, 0, body, WALLS);
+    if (status == ASCC_OK)
+        status = add_walls(m, body, m->scene->wall_count, BODY);
+    return status;
 }
 
 /* Everything anew, so that nothing of an earlier start can reach this one. */
@@ -145,6 +158,36 @@ static void learned_impulses(const void *state, double external[3], double wall[
     }
 }
 
+/* Point by point: bodies of a few hundred points. */
+static bool learned_move_body(void *state, const double by[3], ascc_method_error *error)
+{
+    learned *m = state;
+    for (size_t i = m->scene->wall_count - m->scene->body_count; i < m->scene->wall_count; i++) {
+        double x[3];
+        const ascc_array read = {.data = x, .scalar = ASCC_DOUBLE};
+        const ascc_const_array moved = {.data = x, .scalar = ASCC_DOUBLE};
+        (void)ascc_particles_get(m->particles, ASCC_BOUNDARY, ASCC_POSITION, i, 1, &read);
+        for (int c = 0; c < m->scene->dimension; c++)
+            x[c] += by[c];
+        if (ascc_particles_set(m->particles, ASCC_BOUNDARY, ASCC_POSITION, i, 1, &moved) !=
+            ASCC_OK) {
+            snprintf(error->text, sizeof error->text, "%s", ascc_particles_message(m->particles));
+            return false;
+        }
+    }
+    return true;
+}
+
+static void learned_body_impulse(const void *state, double impulse[3])
+{
+    const learned *m = state;
+    const double quantum = ascc_particles_momentum_quantum(m->particles);
+    int64_t quanta[3] = {0};
+    (void)ascc_particles_body_impulse(m->particles, BODY, NULL, quanta, NULL);
+    for (int c = 0; c < 3; c++)
+        impulse[c] = (double)quanta[c] * quantum;
+}
+
 const ascc_method ascc_method_model = {
     .prefix = "",
     .help = "FILE           a model file, run by libascc; demo: the demonstration model",
@@ -153,5 +196,7 @@ const ascc_method ascc_method_model = {
     .advance = learned_advance,
     .read = learned_read,
     .impulses = learned_impulses,
+    .move_body = learned_move_body,
+    .body_impulse = learned_body_impulse,
     .close = learned_close,
 };
