@@ -291,12 +291,12 @@ static ascc_status take_job(pair_job *job, int32_t set, const ascc_impulse_scale
     const ascc_hierarchy *h = job->run->hierarchy;
     ascc_arena *arena = job->run->tools->arena;
     const size_t count = h->set[set].count, d = (size_t)job->run->network->plan->dimension;
-    uint8_t *fluid = ascc_arena_take(arena, count, 1);
-    double *mass = ascc_arena_take(arena, count, sizeof *mass);
-    job->sum = ascc_arena_take(arena, count, d * sizeof(int64_t));
+    uint8_t *fluid = ascc_arena_lend(arena, count, 1);
+    double *mass = ascc_arena_lend(arena, count, sizeof *mass);
+    job->sum = ascc_arena_lend(arena, count, d * sizeof(int64_t));
     const bool basis = job->run->network->plan->output.filter.bumps > 0;
     if (basis)
-        job->share = ascc_arena_take(arena, count, ASCC_MAX_BUMPS * sizeof *job->share);
+        job->share = ascc_arena_lend(arena, count, ASCC_MAX_BUMPS * sizeof *job->share);
     if (!fluid || !mass || !job->sum || (basis && !job->share))
         return ascc_fail(job->run->tools->message, ASCC_ERROR_MEMORY, "no memory for the impulses");
     memset(job->sum, 0, count * d * sizeof(int64_t));

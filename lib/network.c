@@ -206,8 +206,7 @@ static ascc_status open_rows(ascc_network_run *run)
             status =
                 ascc_hierarchy_grid(h, run->tools, key->source, rows->radius, &rows->source_grid);
         if (status == ASCC_OK)
-            status = ascc_rows_open(rows, run->tools,
-                                    ascc_max_size(key->expected, rows->query->count * 8));
+            status = ascc_rows_open(rows, run->tools, key->expected);
         if (status != ASCC_OK)
             return status;
     }
@@ -303,7 +302,7 @@ static ascc_status demand_output(ascc_network_run *run)
     const int32_t key = network->term_key[network->plan->term_count];
     if (key < 0)
         return ASCC_OK;
-    uint8_t *fluid = ascc_arena_take(run->tools->arena, h->set[set].count, 1);
+    uint8_t *fluid = ascc_arena_lend(run->tools->arena, h->set[set].count, 1);
     if (!fluid)
         return ascc_fail(run->tools->message, ASCC_ERROR_MEMORY, "no memory for the last layer");
     memcpy(fluid, active, h->set[set].count);
@@ -354,7 +353,7 @@ ascc_status ascc_network_demand(ascc_network_run *run, ascc_network *network,
         status = demand_layer(run, l);
     for (int32_t k = 0; status == ASCC_OK && k < network->key_count; k++) {
         const ascc_rows *rows = &run->rows[k];
-        network->key[k].expected = rows->used + rows->used / 8;
+        network->key[k].expected = rows->used + rows->used / 16;
         run->neighbor_count += rows->stored;
         run->longest = rows->longest > run->longest ? rows->longest : run->longest;
     }
@@ -575,7 +574,8 @@ static ascc_status compute_layer(ascc_network_run *run, int32_t l, uint32_t *lis
     job.room = ((size_t)run->longest + 15) / 8 * 8;
     job.geometry_offset = job.tile_offset + TILE_ROWS * job.width;
     job.scratch_size = job.geometry_offset + (ASCC_GEOMETRY_ARRAYS + members) * job.room;
-    job.scratch = ascc_arena_take(tools->arena, slots * job.scratch_size, sizeof(float));
+    const ascc_arena_mark mark = ascc_arena_mark_of(tools->arena);
+    job.scratch = ascc_arena_lend(tools->arena, slots * job.scratch_size, sizeof(float));
     if (!job.scratch || !take_value(run, l + 2))
         return ascc_fail(tools->message, ASCC_ERROR_MEMORY, "no memory for layer %s", layer->name);
     size_t count = 0;
@@ -584,6 +584,7 @@ static ascc_status compute_layer(ascc_network_run *run, int32_t l, uint32_t *lis
         if (run->value[l + 2].active[i])
             list[count++] = (uint32_t)i;
     ascc_workers_run(tools->workers, count, TILE_ROWS * 4, compute_tiles, &job);
+    ascc_arena_return(tools->arena, mark);
     return ASCC_OK;
 }
 
@@ -594,7 +595,7 @@ ascc_status ascc_network_forward(ascc_network_run *run, const float *fluid_featu
     size_t most = 0;
     for (int s = 0; s < ASCC_MAX_SETS; s++)
         most = ascc_max_size(most, run->hierarchy->set[s].count);
-    uint32_t *list = ascc_arena_take(run->tools->arena, most, sizeof *list);
+    uint32_t *list = ascc_arena_lend(run->tools->arena, most, sizeof *list);
     if (!list || !take_value(run, 0) || !take_value(run, 1))
         return ascc_fail(run->tools->message, ASCC_ERROR_MEMORY, "no memory for the features");
     place_features(run, 0, fluid_features);

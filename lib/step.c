@@ -160,9 +160,9 @@ static bool take_features(const ascc_step *step, ascc_arena *arena, const ascc_p
 {
     const ascc_plan *plan = &step->model->plan;
     const size_t d = (size_t)p->dimension;
-    *fluid = ascc_arena_take(arena, p->fluid_count, (size_t)plan->fluid_channels * sizeof(float));
+    *fluid = ascc_arena_lend(arena, p->fluid_count, (size_t)plan->fluid_channels * sizeof(float));
     *boundary =
-        ascc_arena_take(arena, p->boundary_count, (size_t)plan->boundary_channels * sizeof(float));
+        ascc_arena_lend(arena, p->boundary_count, (size_t)plan->boundary_channels * sizeof(float));
     if (!*fluid || !*boundary)
         return false;
     for (size_t i = 0; i < p->fluid_count; i++)
@@ -178,7 +178,7 @@ static bool take_features(const ascc_step *step, ascc_arena *arena, const ascc_p
 /* Positions in metres. */
 static double *scaled(ascc_arena *arena, const double *position, size_t count, double unit)
 {
-    double *to = ascc_arena_take(arena, count, sizeof *to);
+    double *to = ascc_arena_lend(arena, count, sizeof *to);
     for (size_t i = 0; to && i < count; i++)
         to[i] = position[i] * unit;
     return to;
@@ -236,21 +236,25 @@ static ascc_status run_network(ascc_step *step, const ascc_search_tools *tools,
     ascc_network_run run;
     float *fluid, *boundary;
     ascc_scene scene = {.fluid_count = p->fluid_count, .boundary_count = p->boundary_count};
+    const ascc_arena_mark before_features = ascc_arena_mark_of(tools->arena);
+    const bool room = take_features(step, tools->arena, p, advance, &fluid, &boundary);
+    const ascc_arena_mark before_scene = ascc_arena_mark_of(tools->arena);
     scene.fluid = scaled(tools->arena, advance->position, p->fluid_count * d, step->length_unit);
     scene.boundary =
         scaled(tools->arena, p->wall_position, p->boundary_count * d, step->length_unit);
-    if (!scene.fluid || !scene.boundary ||
-        !take_features(step, tools->arena, p, advance, &fluid, &boundary))
+    if (!room || !scene.fluid || !scene.boundary)
         return ascc_fail(tools->message, ASCC_ERROR_MEMORY, "no memory for the features");
     s->seconds_prepare = lap(since);
 
     ascc_status status = ascc_hierarchy_build(&hierarchy, tools, &step->model->plan, &scene);
+    ascc_arena_return(tools->arena, before_scene);
     s->seconds_hierarchy = lap(since);
     if (status == ASCC_OK)
         status = ascc_network_demand(&run, &step->network, &hierarchy, tools);
     s->seconds_search = lap(since);
     if (status == ASCC_OK)
         status = ascc_network_forward(&run, fluid, boundary);
+    ascc_arena_return(tools->arena, before_features);
     s->seconds_network = lap(since);
     if (status != ASCC_OK)
         return status;
