@@ -313,6 +313,27 @@ static ascc_status take_job(pair_job *job, int32_t set, const ascc_impulse_scale
     return ASCC_OK;
 }
 
+typedef struct sums_job {
+    const pair_job *from;
+    const ascc_impulses *impulses;
+    int32_t set;
+} sums_job;
+
+/* Sums in the host's order. */
+static void give_sums(void *data, size_t begin, size_t end, int32_t slot)
+{
+    (void)slot;
+    const sums_job *job = data;
+    const ascc_hierarchy *h = job->from->run->hierarchy;
+    const size_t d = (size_t)job->from->run->network->plan->dimension;
+    for (size_t i = begin; i < end; i++) {
+        const size_t row = host_row(h, job->set, i);
+        int64_t *to = job->from->fluid[i] ? job->impulses->fluid + row * d
+                                          : job->impulses->wall + (row - h->fluid_count) * d;
+        memcpy(to, job->from->sum + i * d, d * sizeof *to);
+    }
+}
+
 ascc_status ascc_antisymmetric_impulses(const ascc_network_run *run,
                                         const ascc_impulse_scale *scale,
                                         const ascc_impulses *impulses, uint64_t *pair_count)
@@ -320,7 +341,7 @@ ascc_status ascc_antisymmetric_impulses(const ascc_network_run *run,
     const ascc_network *network = run->network;
     const ascc_hierarchy *h = run->hierarchy;
     const int32_t set = ascc_network_set(network, network->plan->output.source);
-    const size_t count = h->set[set].count, d = (size_t)network->plan->dimension;
+    const size_t count = h->set[set].count;
     pair_job job = {.run = run,
                     .rows = &run->rows[network->term_key[network->plan->term_count]],
                     .scale = scale};
@@ -339,12 +360,8 @@ ascc_status ascc_antisymmetric_impulses(const ascc_network_run *run,
     if (bad)
         return bad_value(run, output_values(run), ascc_padded(network->plan->output.inputs),
                          (size_t)bad - 1, host_row(h, set, (size_t)bad - 1));
-    for (size_t i = 0; i < count; i++) {
-        const size_t row = host_row(h, set, i);
-        int64_t *to =
-            job.fluid[i] ? impulses->fluid + row * d : impulses->wall + (row - h->fluid_count) * d;
-        memcpy(to, job.sum + i * d, d * sizeof *to);
-    }
+    sums_job sums = {&job, impulses, set};
+    ascc_workers_run(run->tools->workers, count, 4096, give_sums, &sums);
     *pair_count = atomic_load(&job.pairs);
     return ASCC_OK;
 }

@@ -29,15 +29,17 @@ static size_t keep_boundary(uint32_t *kept, const ascc_plan *plan, const ascc_sc
 {
     const size_t d = (size_t)plan->dimension;
     double low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY};
-    for (size_t i = 0; i < scene->fluid_count; i++)
+    const bool crops = plan->boundary_crop > 0.0;
+    for (size_t i = 0; crops && scene->boundary_count && i < scene->fluid_count; i++)
         for (size_t c = 0; c < d; c++) {
-            low[c] = fmin(low[c], scene->fluid[i * d + c]);
-            high[c] = fmax(high[c], scene->fluid[i * d + c]);
+            const double x = scene->fluid[i * d + c];
+            low[c] = x < low[c] ? x : low[c];
+            high[c] = x > high[c] ? x : high[c];
         }
     size_t count = 0;
     for (size_t i = 0; i < scene->boundary_count; i++) {
         bool inside = true;
-        for (size_t c = 0; plan->boundary_crop > 0.0 && c < d; c++) {
+        for (size_t c = 0; crops && c < d; c++) {
             const double x = scene->boundary[i * d + c];
             inside &= x >= low[c] - plan->boundary_crop && x <= high[c] + plan->boundary_crop;
         }
@@ -81,11 +83,8 @@ static void convert(void *data, size_t begin, size_t end, int32_t slot)
             good = good && (c >= d || ascc_scale_apply(&job->hierarchy->scale, x[c],
                                                        &job->raw.position[c][i]));
         }
-        size_t seen = atomic_load_explicit(&job->too_far, memory_order_relaxed);
-        while (!good && (seen == 0 || seen > i + 1) &&
-               !atomic_compare_exchange_weak_explicit(&job->too_far, &seen, i + 1,
-                                                      memory_order_relaxed, memory_order_relaxed))
-            ;
+        if (!good)
+            ascc_note_first(&job->too_far, i);
     }
 }
 
@@ -180,11 +179,7 @@ static ascc_status build_level_zero(ascc_hierarchy *h, const ascc_search_tools *
     if (status != ASCC_OK)
         return status;
     ascc_workers_run(tools->workers, count, job.part, gather, &job);
-    for (size_t p = 0, sum = 0; p < ASCC_SORT_PARTS; p++) {
-        const size_t fluid = job.first[p];
-        job.first[p] = sum;
-        sum += fluid;
-    }
+    (void)ascc_part_sums(job.first);
     ascc_workers_run(tools->workers, count, job.part, split, &job);
     ascc_arena_return(arena, mark);
     return ASCC_OK;

@@ -16,6 +16,17 @@ size_t ascc_part_size(size_t count)
     return ascc_max_size((count + ASCC_SORT_PARTS - 1) / ASCC_SORT_PARTS, SMALLEST_PART);
 }
 
+size_t ascc_part_sums(size_t number[ASCC_SORT_PARTS])
+{
+    size_t sum = 0;
+    for (size_t p = 0; p < ASCC_SORT_PARTS; p++) {
+        const size_t before = sum;
+        sum += number[p];
+        number[p] = before;
+    }
+    return sum;
+}
+
 bool ascc_keys_lend(ascc_keys *keys, ascc_arena *arena, size_t count, bool rows)
 {
     if (count >= UINT32_MAX) /* rows and places have 32 bits */
@@ -130,12 +141,7 @@ bool ascc_keys_distinct(const ascc_keys *keys, ascc_arena *arena, ascc_workers *
 {
     distinct_job job = {.keys = keys, .distinct = distinct, .part = ascc_part_size(keys->count)};
     ascc_workers_run(workers, keys->count, job.part, count_new, &job);
-    distinct->count = 0;
-    for (size_t p = 0; p < ASCC_SORT_PARTS; p++) {
-        const size_t count = job.first[p];
-        job.first[p] = distinct->count;
-        distinct->count += count;
-    }
+    distinct->count = ascc_part_sums(job.first);
     distinct->key = room(arena, distinct->count, sizeof *distinct->key);
     distinct->start = room(arena, distinct->count + 1, sizeof *distinct->start);
     if (!distinct->key || !distinct->start)

@@ -34,5 +34,7 @@ bool ascc_keys_distinct(const ascc_keys *keys, ascc_arena *arena, ascc_workers *
  * parts of this size are at most ASCC_SORT_PARTS. */
 #define ASCC_SORT_PARTS 32
 size_t ascc_part_size(size_t count);
+/* Numbers found by parts become sums of those before; returns the sum of all. */
+size_t ascc_part_sums(size_t number[ASCC_SORT_PARTS]);
 
 #endif
