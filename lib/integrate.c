@@ -11,37 +11,15 @@ static ascc_status too_fast(const ascc_particles *p, size_t i, ascc_message *mes
                      i);
 }
 
-typedef struct integrate_job integrate_job;
-struct integrate_job {
-    ascc_status (*row)(const integrate_job *job, size_t i, ascc_message *message);
+typedef struct integrate_job {
     const ascc_particles *p;
     const ascc_motion *motion;
     const int64_t *impulse;
     ascc_advance *advance;
-    atomic_size_t bad;
-};
+    atomic_size_t bad; /* 1 + first row that fails */
+} integrate_job;
 
-static void integrate_rows(void *data, size_t begin, size_t end, int32_t slot)
-{
-    (void)slot;
-    integrate_job *job = data;
-    ascc_message message;
-    for (size_t i = begin; i < end; i++)
-        if (job->row(job, i, &message) != ASCC_OK) {
-            ascc_note_first(&job->bad, i);
-            return;
-        }
-}
-
-/* All rows; the first one that fails says why. */
-static ascc_status integrate(ascc_workers *workers, integrate_job *job, ascc_message *message)
-{
-    ascc_workers_run(workers, job->p->fluid_count, 1024, integrate_rows, job);
-    const size_t bad = atomic_load(&job->bad);
-    return bad ? job->row(job, bad - 1, message) : ASCC_OK;
-}
-
-static ascc_status begin_row(const integrate_job *job, size_t i, ascc_message *message)
+static inline ascc_status begin_row(const integrate_job *job, size_t i, ascc_message *message)
 {
     const ascc_particles *p = job->p;
     const ascc_motion *motion = job->motion;
@@ -72,15 +50,29 @@ static ascc_status begin_row(const integrate_job *job, size_t i, ascc_message *m
     return ASCC_OK;
 }
 
+static void begin_rows(void *data, size_t begin, size_t end, int32_t slot)
+{
+    (void)slot;
+    integrate_job *job = data;
+    ascc_message message;
+    for (size_t i = begin; i < end; i++)
+        if (begin_row(job, i, &message) != ASCC_OK) {
+            ascc_note_first(&job->bad, i);
+            return;
+        }
+}
+
 ascc_status ascc_integrate_begin(ascc_workers *workers, const ascc_particles *p,
                                  const ascc_motion *motion, ascc_advance *advance,
                                  ascc_message *message)
 {
-    integrate_job job = {.row = begin_row, .p = p, .motion = motion, .advance = advance};
-    return integrate(workers, &job, message);
+    integrate_job job = {.p = p, .motion = motion, .advance = advance};
+    ascc_workers_run(workers, p->fluid_count, 1024, begin_rows, &job);
+    const size_t bad = atomic_load(&job.bad); /* says once more why */
+    return bad ? begin_row(&job, bad - 1, message) : ASCC_OK;
 }
 
-static ascc_status end_row(const integrate_job *job, size_t i, ascc_message *message)
+static inline ascc_status end_row(const integrate_job *job, size_t i, ascc_message *message)
 {
     const ascc_particles *p = job->p;
     const ascc_motion *motion = job->motion;
@@ -112,11 +104,24 @@ static ascc_status end_row(const integrate_job *job, size_t i, ascc_message *mes
     return ASCC_OK;
 }
 
+static void end_rows(void *data, size_t begin, size_t end, int32_t slot)
+{
+    (void)slot;
+    integrate_job *job = data;
+    ascc_message message;
+    for (size_t i = begin; i < end; i++)
+        if (end_row(job, i, &message) != ASCC_OK) {
+            ascc_note_first(&job->bad, i);
+            return;
+        }
+}
+
 ascc_status ascc_integrate_end(ascc_workers *workers, const ascc_particles *p,
                                const ascc_motion *motion, const int64_t *impulse,
                                ascc_advance *advance, ascc_message *message)
 {
-    integrate_job job = {
-        .row = end_row, .p = p, .motion = motion, .impulse = impulse, .advance = advance};
-    return integrate(workers, &job, message);
+    integrate_job job = {.p = p, .motion = motion, .impulse = impulse, .advance = advance};
+    ascc_workers_run(workers, p->fluid_count, 1024, end_rows, &job);
+    const size_t bad = atomic_load(&job.bad);
+    return bad ? end_row(&job, bad - 1, message) : ASCC_OK;
 }
