@@ -16,7 +16,9 @@ typedef struct pair_job {
     const uint8_t *fluid; /* [set rows] 1 = a fluid particle */
     const double *mass;   /* [set rows] 0 for walls */
     bool uniform;         /* all fluid particles have one mass */
-    int64_t *sum;         /* [set rows][dimension] */
+    int64_t *sum;         /* [set rows][stride] */
+    bool direct;          /* terms of a grid become impulses in the kernel table */
+    size_t stride;        /* 4 if direct, else the dimension */
     float *share;         /* [set rows][8]: what each row gives each bump of a basis, else NULL */
     size_t chunk, phase;
     atomic_uint_least64_t pairs;
@@ -138,6 +140,15 @@ static const float *output_values(const ascc_network_run *run)
     return output->rectify ? value->rectified : value->raw;
 }
 
+/* Fills the batch up to whole vectors, so that no pair is mapped on its own; returns the count. */
+static size_t fill_up(batch *b)
+{
+    size_t count = b->count;
+    for (; count % 8; count++)
+        b->neighbor[count] = b->neighbor[0];
+    return count;
+}
+
 /* What the kernel gives for each pair of the batch. */
 static void evaluate_kernel(const pair_job *job, size_t i, batch *b)
 {
@@ -147,8 +158,8 @@ static void evaluate_kernel(const pair_job *job, size_t i, batch *b)
     const ascc_filter *filter = &plan->output.filter;
     const size_t d = (size_t)plan->dimension, a = ascc_padded(plan->output.inputs);
     const float *value = output_values(run);
-    const ascc_geometry g =
-        ascc_network_geometry(run, job->rows, filter, i, b->neighbor, b->count, b->geometry, BATCH);
+    const ascc_geometry g = ascc_network_geometry(run, job->rows, filter, i, b->neighbor,
+                                                  fill_up(b), b->geometry, BATCH);
     if (job->share)
         kernels->pair_strengths(g.pairs.distance, b->neighbor, b->count,
                                 job->share + i * ASCC_MAX_BUMPS, job->share, (size_t)filter->bumps,
@@ -159,6 +170,23 @@ static void evaluate_kernel(const pair_job *job, size_t i, batch *b)
                             b->term[0]);
 }
 
+/* Impulses of a grid's terms, where nothing turns them. */
+static void give_terms(pair_job *job, size_t i, batch *b)
+{
+    const double *scale = job->scale->factor;
+    const size_t d = (size_t)job->run->network->plan->dimension;
+    const double factor[4] = {scale[0], scale[1], d > 2 ? scale[2] : 0.0, 0.0};
+    double mass[BATCH];
+    mass[0] = job->mass[i];
+    for (size_t k = 0; k < b->count && !job->uniform; k++)
+        mass[k] = pair_mass(job->mass[i], job->mass[b->neighbor[k]]);
+    if (!job->run->tools->kernels->pair_impulses(b->term[0], factor, mass, !job->uniform,
+                                                 ASCC_IMPULSE_LIMIT, b->neighbor, b->count,
+                                                 job->sum + i * 4, job->sum))
+        note_bad_row(job, i);
+    b->count = 0;
+}
+
 static void flush(pair_job *job, size_t i, batch *b)
 {
     const size_t d = (size_t)job->run->network->plan->dimension;
@@ -166,6 +194,10 @@ static void flush(pair_job *job, size_t i, batch *b)
     int64_t quanta[BATCH];
     b->pairs += b->count;
     evaluate_kernel(job, i, b);
+    if (job->direct) {
+        give_terms(job, i, b);
+        return;
+    }
     impulses_of(job, i, b, impulse);
     for (size_t c = 0; c < d; c++) {
         if (!round_all(impulse[c], b->count, quanta)) {
@@ -176,9 +208,9 @@ static void flush(pair_job *job, size_t i, batch *b)
         bool good = true;
         for (size_t k = 0; k < b->count; k++) {
             own += quanta[k];
-            good &= add_impulse(&job->sum[b->neighbor[k] * d + c], -quanta[k]);
+            good &= add_impulse(&job->sum[b->neighbor[k] * job->stride + c], -quanta[k]);
         }
-        if (!add_impulse(&job->sum[i * d + c], own) || !good)
+        if (!add_impulse(&job->sum[i * job->stride + c], own) || !good)
             note_bad_row(job, i);
     }
     b->count = 0;
@@ -293,13 +325,15 @@ static ascc_status take_job(pair_job *job, int32_t set, const ascc_impulse_scale
     const size_t count = h->set[set].count, d = (size_t)job->run->network->plan->dimension;
     uint8_t *fluid = ascc_arena_lend(arena, count, 1);
     double *mass = ascc_arena_lend(arena, count, sizeof *mass);
-    job->sum = ascc_arena_lend(arena, count, d * sizeof(int64_t));
     const bool basis = job->run->network->plan->output.filter.bumps > 0;
+    job->direct = !basis && !job->run->network->plan->output.radial;
+    job->stride = job->direct ? 4 : d;
+    job->sum = ascc_arena_lend(arena, count, job->stride * sizeof(int64_t));
     if (basis)
         job->share = ascc_arena_lend(arena, count, ASCC_MAX_BUMPS * sizeof *job->share);
     if (!fluid || !mass || !job->sum || (basis && !job->share))
         return ascc_fail(job->run->tools->message, ASCC_ERROR_MEMORY, "no memory for the impulses");
-    memset(job->sum, 0, count * d * sizeof(int64_t));
+    memset(job->sum, 0, count * job->stride * sizeof(int64_t));
     for (size_t i = 0; i < count; i++) {
         const size_t row = host_row(h, set, i);
         fluid[i] = row < h->fluid_count;
@@ -330,7 +364,7 @@ static void give_sums(void *data, size_t begin, size_t end, int32_t slot)
         const size_t row = host_row(h, job->set, i);
         int64_t *to = job->from->fluid[i] ? job->impulses->fluid + row * d
                                           : job->impulses->wall + (row - h->fluid_count) * d;
-        memcpy(to, job->from->sum + i * d, d * sizeof *to);
+        memcpy(to, job->from->sum + i * job->from->stride, d * sizeof *to);
     }
 }
 
