@@ -384,6 +384,10 @@ static ascc_status read_forces(ascc_step *step, const ascc_particles *p, const a
     }
     if (!f.acceleration || !f.acceleration->data)
         return ASCC_OK;
+    if (!ascc_scalar_known(f.acceleration->scalar) || f.acceleration->reserved != 0)
+        return ascc_fail(&step->message, ASCC_ERROR_ARGUMENT,
+                         "acceleration: scalar %d, reserved %ld: not an array known here",
+                         (int)f.acceleration->scalar, (long)f.acceleration->reserved);
     if (!ascc_grow(&step->context->allocator, (void **)&step->acceleration,
                    &step->acceleration_capacity, p->fluid_count * d, sizeof(double)))
         return ascc_fail(&step->message, ASCC_ERROR_MEMORY, "no memory for the acceleration");
