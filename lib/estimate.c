@@ -56,7 +56,7 @@ static double row_length(const ascc_plan *plan, const ascc_rows_key *key)
 
 static double rows_bytes(const ascc_plan *plan, const ascc_rows_key *key, double queries)
 {
-    return queries * (12.0 + 4.0 * 1.0625 * row_length(plan, key));
+    return queries * (12.0 + 4.0 * 1.125 * row_length(plan, key));
 }
 
 /* Slots of a set that is sorted again for a radius, and its cells. */
@@ -149,9 +149,12 @@ size_t ascc_estimate_scratch(const ascc_network *network, size_t fluid, size_t b
     const double search = search_bytes(network, f, b);
     const double forward =
         features + all * 4.0 + (double)threads * layer_bytes(plan, 1.5 * longest);
-    const double last = all * (9.0 + 8.0 * d + (plan->output.filter.bumps ? 32.0 : 0.0));
+    const bool direct = !plan->output.filter.bumps && !plan->output.radial; /* sums of four */
+    const double last = all * (direct                      ? 41.0
+                               : plan->output.filter.bumps ? 41.0 + 8.0 * d
+                                                           : 9.0 + 8.0 * d);
     double bytes = fmax(features + hierarchy_bytes(plan, f, b),
                         search + value_bytes(network, f, b) + fmax(forward, last));
-    bytes = 1.0625 * (points + bytes) + 64e3; /* what a block has more; small things */
+    bytes = 1.125 * (points + bytes) + 64e3; /* what a block has more; small things */
     return bytes < (double)(SIZE_MAX / 2) ? (size_t)bytes : SIZE_MAX / 2;
 }

@@ -293,7 +293,7 @@ void ascc_arena_reset(ascc_arena *arena)
     const size_t needed = arena->needed;
     arena->front = arena->back = arena->taken = arena->lent = arena->needed = 0;
     if (needed > arena->block_size)
-        (void)ascc_arena_reserve(arena, needed + needed / 16); /* else the next step asks again */
+        (void)ascc_arena_reserve(arena, needed + needed / 8); /* else the next step asks again */
 }
 
 size_t ascc_arena_size(const ascc_arena *arena)

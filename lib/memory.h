@@ -32,7 +32,7 @@ bool ascc_grow(const ascc_allocator *allocator, void **memory, size_t *capacity,
  *
  *   block:  [ taken | taken | taken |    free    | lent | lent ]    reset: all is free
  *   what does not fit goes into overflow blocks; reset replaces block and overflow by one block of
- *   1.0625 times what was needed at once, so a steady user allocates nothing.
+ *   1.125 times what was needed at once, so a steady user allocates nothing.
  */
 typedef struct ascc_arena_overflow ascc_arena_overflow;
 

@@ -701,7 +701,7 @@ ascc_status ascc_rows_make(ascc_rows *rows, const ascc_search_tools *tools, cons
     size_t needed = atomic_load(&job.used);
     while (status == ASCC_OK && needed > rows->capacity) {
         rows->used = rows->capacity; /* whole rows below it are kept, with holes at the end */
-        if (!rows_reserve(rows, tools->arena, needed + needed / 16))
+        if (!rows_reserve(rows, tools->arena, needed + needed / 8))
             return ascc_fail(tools->message, ASCC_ERROR_MEMORY, "no memory for %zu neighbours",
                              needed);
         status = rows_pass(&job);

@@ -367,7 +367,7 @@ ascc_status ascc_network_demand(ascc_network_run *run, ascc_network *network,
         status = demand_layer(run, l);
     for (int32_t k = 0; status == ASCC_OK && k < network->key_count; k++) {
         const ascc_rows *rows = &run->rows[k];
-        network->key[k].expected = rows->used + rows->used / 16;
+        network->key[k].expected = rows->used + rows->used / 8;
         run->neighbor_count += rows->stored;
         run->longest = rows->longest > run->longest ? rows->longest : run->longest;
     }

@@ -217,10 +217,10 @@ static void what_is_lent_is_lent_again_after_its_return(void **state)
         }
         assert_int_equal(kept[99], 1);
         /* 100 in 128, 50 times 10 in 64, and once 1000 in 1024 and 231 in 256; after the first turn
-         * one block of a sixteenth more */
+         * one block of an eighth more */
         assert_int_equal(arena.needed, 128 + 50 * 64 + 1024 + 256);
         ascc_arena_reset(&arena);
-        assert_int_equal(memory.bytes, 4608 + 4608 / 16);
+        assert_int_equal(memory.bytes, 4608 + 4608 / 8);
         assert_int_equal(ascc_arena_size(&arena), memory.bytes);
     }
     ascc_arena_close(&arena);
@@ -256,7 +256,7 @@ static void a_piece_that_grows_keeps_its_contents_and_gives_back_the_rest(void *
         assert_null(ascc_arena_grow(&arena, piece, count, SIZE_MAX, 4));
         (void)other;
         ascc_arena_reset(&arena);
-        assert_int_equal(memory.bytes, 2304 + 2304 / 16);
+        assert_int_equal(memory.bytes, 2304 + 2304 / 8);
     }
     ascc_arena_close(&arena);
     assert_true(test_memory_is_clean(&memory));
