@@ -347,6 +347,14 @@ static ascc_status take_job(pair_job *job, int32_t set, const ascc_impulse_scale
     return ASCC_OK;
 }
 
+/* Rows of a chunk, at least `least`: in each of the three phases as many chunks for one worker as for
+ * another, if that leaves any. Sums are integers, so where chunks end does not matter. */
+static size_t chunk_size(size_t count, size_t least, size_t workers)
+{
+    const size_t round = 3 * workers, chunks = count / least / round * round;
+    return chunks ? (count + chunks - 1) / chunks : least;
+}
+
 typedef struct sums_job {
     const pair_job *from;
     const ascc_impulses *impulses;
@@ -385,7 +393,8 @@ ascc_status ascc_antisymmetric_impulses(const ascc_network_run *run,
     if (job.share)
         ascc_workers_run(run->tools->workers, count, 1024, compute_shares, &job);
     ascc_workers_run(run->tools->workers, count, 1024, measure_rows, &job);
-    job.chunk = ascc_max_size(atomic_load(&job.reach), SMALLEST_CHUNK);
+    job.chunk = chunk_size(count, ascc_max_size(atomic_load(&job.reach), SMALLEST_CHUNK),
+                           (size_t)ascc_workers_count(run->tools->workers));
     const size_t chunks = (count + job.chunk - 1) / job.chunk;
     for (job.phase = 0; job.phase < 3 && job.phase < chunks; job.phase++)
         ascc_workers_run(run->tools->workers, (chunks - job.phase + 2) / 3, 1, evaluate_chunks,
