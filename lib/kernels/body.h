@@ -510,9 +510,24 @@ static void multiply(const float *in, size_t in_stride, size_t n, size_t a, cons
         store_totals(out, sum[0], sum[1], outputs > 2 ? sum[outputs - 1] : fill(0.0f));            \
     }
 PAIR(pair_3_8, 3, 8)
-PAIR(pair_2_8, 2, 8)
-PAIR(pair_3_4, 3, 4)
 PAIR(pair_2_4, 2, 4)
+
+/* The same for flat kernels in space and others that are seldom. */
+static void pair_any(const float *share, const size_t *offset, int count, const float *center,
+                     const float *f, size_t a, const float *weight, size_t outputs, float *out)
+{
+    for (size_t o = 0; o < 4; o++) {
+        vector sum = fill(0.0f);
+        for (size_t j = 0; o < outputs && j < a; j += LANES) {
+            const float *w = weight + o * a + j;
+            vector g = times(fill(share[0]), load(w));
+            for (int c = 1; c < count; c++)
+                g = fused(fill(share[c * LANES]), load(w + offset[c]), g);
+            sum = fused(add(load(center + j), load(f + j)), g, sum);
+        }
+        out[o] = total(sum);
+    }
+}
 
 static void pair_terms(const ascc_pairs *pairs, const float *window, const uint32_t *neighbor,
                        size_t k, const float *center, const float *feature, size_t a,
@@ -533,12 +548,10 @@ static void pair_terms(const ascc_pairs *pairs, const float *window, const uint3
             float *to = out + (i + l) * 4;
             if (b == 3 && count == 8)
                 pair_3_8(share, offset, center, f, a, base, to);
-            else if (b == 3)
-                pair_3_4(share, offset, center, f, a, base, to);
-            else if (count == 8)
-                pair_2_8(share, offset, center, f, a, base, to);
-            else
+            else if (b == 2 && count == 4)
                 pair_2_4(share, offset, center, f, a, base, to);
+            else
+                pair_any(share, offset, count, center, f, a, base, b, to);
         }
     }
 }

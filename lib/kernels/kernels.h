@@ -73,7 +73,7 @@ typedef struct ascc_kernels {
 
     /* out[j][b] = window * sum over a of (center[a] + feature[neighbor[j]][a]) * kernel(j)[b][a],
      * kernel(j) = sum over c of trilinear weight * weight[c][b][a], for each pair j < k on its own.
-     * 8 partial sums by a mod 8; b is 2 or 3 and not filled up here; out is [k][4], the rest zeros. */
+     * 8 partial sums by a mod 8; b <= 3 is not filled up here; out is [k][4], the rest zeros. */
     void (*pair_terms)(const ascc_pairs *pairs, const float *window, const uint32_t *neighbor,
                        size_t k, const float *center, const float *feature, size_t a,
                        const int32_t cells[3], const float *weight, size_t b, float *out);
