@@ -100,17 +100,19 @@ void bench_pairs_exact(void *data)
     check(p, ascc_antisymmetric_impulses(&p->run, &scale, &impulses, &p->pair_count));
 }
 
-/* One batch of the twin. */
-static void flush(bench_pairs *p, const ascc_rows *rows, size_t i, const uint32_t *neighbor,
-                  size_t count)
+/* One batch of the twin, its geometry filled up to whole vectors as the library's. */
+static void flush(bench_pairs *p, const ascc_rows *rows, size_t i, uint32_t *neighbor, size_t count)
 {
+    size_t filled = count;
+    for (; filled % 8; filled++)
+        neighbor[filled] = neighbor[0];
     const ascc_plan *plan = p->network.plan;
     const ascc_value *source = &p->run.value[plan->output.source];
     const float *value = plan->output.rectify ? source->rectified : source->raw;
     const size_t a = ascc_padded(plan->output.inputs);
     float geometry[ASCC_GEOMETRY_ARRAYS * BATCH], term[BATCH][4];
     const ascc_geometry g = ascc_network_geometry(&p->run, rows, &plan->output.filter, i, neighbor,
-                                                  count, geometry, BATCH);
+                                                  filled, geometry, BATCH);
     p->tools.kernels->pair_terms(&g.pairs, g.window, neighbor, count, value + i * a, value, a,
                                  plan->output.filter.cells,
                                  p->network.term_weight[plan->term_count], 3, term[0]);

@@ -18,7 +18,9 @@ typedef struct pair_job {
     const uint8_t *fluid; /* [set rows] 1 = a fluid particle */
     const double *mass;   /* [set rows] 0 for walls */
     bool uniform;         /* all fluid particles have one mass */
-    int64_t *sum;         /* [set rows][dimension] */
+    int64_t *sum;         /* [set rows][stride] */
+    bool direct;          /* terms of a grid become impulses in the kernel table */
+    size_t stride;        /* 4 if direct, else the dimension */
     /* What each row gives each bump of a part of a basis, [set rows][8], else NULL */
     float *share[ASCC_PARTS];
     const double *place; /* [set rows][3] positions that directions come from, else NULL */
@@ -174,6 +176,15 @@ static const float *output_values(const ascc_network_run *run)
     return output->rectify ? value->rectified : value->raw;
 }
 
+/* Fills the batch up to whole vectors, so that no pair is mapped on its own; returns the count. */
+static size_t fill_up(batch *b)
+{
+    size_t count = b->count;
+    for (; count % 8; count++)
+        b->neighbor[count] = b->neighbor[0];
+    return count;
+}
+
 /* What the kernel gives for each pair of the batch. */
 static void evaluate_kernel(const pair_job *job, size_t i, batch *b)
 {
@@ -184,7 +195,7 @@ static void evaluate_kernel(const pair_job *job, size_t i, batch *b)
     const size_t d = (size_t)plan->dimension, a = ascc_padded(plan->output.inputs);
     const float *value = output_values(run);
     const ascc_geometry g =
-        ascc_network_geometry(run, job->rows, filter, i, b->neighbor, b->count, b->geometry, BATCH);
+        ascc_network_geometry(run, job->rows, filter, i, b->neighbor, fill_up(b), b->geometry, BATCH);
     for (int part = 0; part <= ASCC_PART_DAMPING; part++)
         if (job->share[part])
             kernels->pair_strengths(g.pairs.distance, b->neighbor, b->count,
@@ -196,6 +207,23 @@ static void evaluate_kernel(const pair_job *job, size_t i, batch *b)
                             b->term[0]);
 }
 
+/* Impulses of a grid's terms, where nothing turns them. */
+static void give_terms(pair_job *job, size_t i, batch *b)
+{
+    const double *scale = job->scale->factor;
+    const size_t d = (size_t)job->run->network->plan->dimension;
+    const double factor[4] = {scale[0], scale[1], d > 2 ? scale[2] : 0.0, 0.0};
+    double mass[BATCH];
+    mass[0] = job->mass[i];
+    for (size_t k = 0; k < b->count && !job->uniform; k++)
+        mass[k] = pair_mass(job->mass[i], job->mass[b->neighbor[k]]);
+    if (!job->run->tools->kernels->pair_impulses(b->term[0], factor, mass, !job->uniform,
+                                                 ASCC_IMPULSE_LIMIT, b->neighbor, b->count,
+                                                 job->sum + i * 4, job->sum))
+        note_bad_row(job, i);
+    b->count = 0;
+}
+
 static void flush(pair_job *job, size_t i, batch *b)
 {
     const size_t d = (size_t)job->run->network->plan->dimension;
@@ -203,6 +231,10 @@ static void flush(pair_job *job, size_t i, batch *b)
     int64_t quanta[BATCH];
     b->pairs += b->count;
     evaluate_kernel(job, i, b);
+    if (job->direct) {
+        give_terms(job, i, b);
+        return;
+    }
     impulses_of(job, i, b, impulse);
     for (size_t c = 0; c < d; c++) {
         if (!round_all(impulse[c], b->count, quanta)) {
@@ -213,9 +245,9 @@ static void flush(pair_job *job, size_t i, batch *b)
         bool good = true;
         for (size_t k = 0; k < b->count; k++) {
             own += quanta[k];
-            good &= add_impulse(&job->sum[b->neighbor[k] * d + c], -quanta[k]);
+            good &= add_impulse(&job->sum[b->neighbor[k] * job->stride + c], -quanta[k]);
         }
-        if (!add_impulse(&job->sum[i * d + c], own) || !good)
+        if (!add_impulse(&job->sum[i * job->stride + c], own) || !good)
             note_bad_row(job, i);
     }
     b->count = 0;
@@ -328,7 +360,7 @@ static void flush_walls(pair_job *job, size_t i, const size_t *wall, batch *b)
             t[c][k] *= job->mass[i];
         good &= round_all(t[c], b->count, quanta);
         for (size_t k = 0; k < b->count && good; k++)
-            good = add_impulse(&job->sum[i * d + c], quanta[k]) &&
+            good = add_impulse(&job->sum[i * job->stride + c], quanta[k]) &&
                    push_wall(&job->wall[wall[k] * d + c], -quanta[k]);
     }
     if (!good)
@@ -409,24 +441,26 @@ static ascc_status take_job(pair_job *job, int32_t set, const ascc_impulse_scale
     const ascc_hierarchy *h = job->run->hierarchy;
     ascc_arena *arena = job->run->tools->arena;
     const size_t count = h->set[set].count, d = (size_t)job->run->network->plan->dimension;
-    uint8_t *fluid = ascc_arena_take(arena, count, 1);
-    double *mass = ascc_arena_take(arena, count, sizeof *mass);
-    job->sum = ascc_arena_take(arena, count, d * sizeof(int64_t));
+    uint8_t *fluid = ascc_arena_lend(arena, count, 1);
+    double *mass = ascc_arena_lend(arena, count, sizeof *mass);
     const ascc_output *output = &job->run->network->plan->output;
+    job->direct = !output->filter.bumps && !output->radial;
+    job->stride = job->direct ? 4 : d;
+    job->sum = ascc_arena_lend(arena, count, job->stride * sizeof(int64_t));
     bool taken = fluid && mass && job->sum;
     for (int part = 0; part < ASCC_PARTS && output->filter.bumps; part++)
         if (job->run->network->part_weight[part]) {
-            job->share[part] = ascc_arena_take(arena, count, ASCC_MAX_BUMPS * sizeof(float));
+            job->share[part] = ascc_arena_lend(arena, count, ASCC_MAX_BUMPS * sizeof(float));
             taken &= job->share[part] != NULL;
         }
     double *place = NULL;
     if (output->current_direction) {
-        place = ascc_arena_take(arena, count, 3 * sizeof *place);
+        place = ascc_arena_lend(arena, count, 3 * sizeof *place);
         taken &= place != NULL;
     }
     if (!taken)
         return ascc_fail(job->run->tools->message, ASCC_ERROR_MEMORY, "no memory for the impulses");
-    memset(job->sum, 0, count * d * sizeof(int64_t));
+    memset(job->sum, 0, count * job->stride * sizeof(int64_t));
     for (size_t i = 0; i < count; i++) {
         const size_t row = host_row(h, set, i);
         fluid[i] = row < h->fluid_count;
@@ -443,6 +477,35 @@ static ascc_status take_job(pair_job *job, int32_t set, const ascc_impulse_scale
     return ASCC_OK;
 }
 
+/* Rows of a chunk, at least `least`: in each of the three phases as many chunks for one worker as for
+ * another, if that leaves any. Sums are integers, so where chunks end does not matter. */
+static size_t chunk_size(size_t count, size_t least, size_t workers)
+{
+    const size_t round = 3 * workers, chunks = count / least / round * round;
+    return chunks ? (count + chunks - 1) / chunks : least;
+}
+
+typedef struct sums_job {
+    const pair_job *from;
+    const ascc_impulses *impulses;
+    int32_t set;
+} sums_job;
+
+/* Sums in the host's order. */
+static void give_sums(void *data, size_t begin, size_t end, int32_t slot)
+{
+    (void)slot;
+    const sums_job *job = data;
+    const ascc_hierarchy *h = job->from->run->hierarchy;
+    const size_t d = (size_t)job->from->run->network->plan->dimension;
+    for (size_t i = begin; i < end; i++) {
+        const size_t row = host_row(h, job->set, i);
+        int64_t *to = job->from->fluid[i] ? job->impulses->fluid + row * d
+                                          : job->impulses->wall + (row - h->fluid_count) * d;
+        memcpy(to, job->from->sum + i * job->from->stride, d * sizeof *to);
+    }
+}
+
 ascc_status ascc_antisymmetric_impulses(const ascc_network_run *run,
                                         const ascc_impulse_scale *scale,
                                         const ascc_impulses *impulses, uint64_t *pair_count)
@@ -450,7 +513,7 @@ ascc_status ascc_antisymmetric_impulses(const ascc_network_run *run,
     const ascc_network *network = run->network;
     const ascc_hierarchy *h = run->hierarchy;
     const int32_t set = ascc_network_set(network, network->plan->output.source);
-    const size_t count = h->set[set].count, d = (size_t)network->plan->dimension;
+    const size_t count = h->set[set].count;
     pair_job job = {.run = run,
                     .rows = &run->rows[network->term_key[network->plan->term_count]],
                     .scale = scale,
@@ -461,7 +524,8 @@ ascc_status ascc_antisymmetric_impulses(const ascc_network_run *run,
     if (job.share[0])
         ascc_workers_run(run->tools->workers, count, 1024, compute_shares, &job);
     ascc_workers_run(run->tools->workers, count, 1024, measure_rows, &job);
-    job.chunk = ascc_max_size(atomic_load(&job.reach), SMALLEST_CHUNK);
+    job.chunk = chunk_size(count, ascc_max_size(atomic_load(&job.reach), SMALLEST_CHUNK),
+                           (size_t)ascc_workers_count(run->tools->workers));
     const size_t chunks = (count + job.chunk - 1) / job.chunk;
     for (job.phase = 0; job.phase < 3 && job.phase < chunks; job.phase++)
         ascc_workers_run(run->tools->workers, (chunks - job.phase + 2) / 3, 1, evaluate_chunks,
@@ -474,12 +538,8 @@ ascc_status ascc_antisymmetric_impulses(const ascc_network_run *run,
     if (bad)
         return bad_value(run, output_values(run), ascc_padded(network->plan->output.inputs),
                          (size_t)bad - 1, host_row(h, set, (size_t)bad - 1));
-    for (size_t i = 0; i < count; i++) {
-        const size_t row = host_row(h, set, i);
-        int64_t *to =
-            job.fluid[i] ? impulses->fluid + row * d : impulses->wall + (row - h->fluid_count) * d;
-        memcpy(to, job.sum + i * d, d * sizeof *to);
-    }
+    sums_job sums = {&job, impulses, set};
+    ascc_workers_run(run->tools->workers, count, 4096, give_sums, &sums);
     *pair_count = atomic_load(&job.pairs);
     return ASCC_OK;
 }

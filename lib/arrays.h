@@ -7,6 +7,11 @@
 
 #include "common.h"
 
+static inline bool ascc_scalar_known(ascc_scalar scalar)
+{
+    return scalar == ASCC_FLOAT || scalar == ASCC_DOUBLE;
+}
+
 static inline ptrdiff_t ascc_scalar_size(ascc_scalar scalar)
 {
     return scalar == ASCC_DOUBLE ? (ptrdiff_t)sizeof(double) : (ptrdiff_t)sizeof(float);

@@ -1,4 +1,5 @@
-/* Scratch counted as the step takes it: points, grids, rows, values. SPDX-License-Identifier: MIT */
+/* Scratch counted as the step takes it: points, grids, rows, values, and the most of what is lent
+ * meanwhile. SPDX-License-Identifier: MIT */
 #include "estimate.h"
 
 #include <math.h>
@@ -6,9 +7,10 @@
 /* Coarse points beyond those of a full lattice: surfaces, and voxels that only a corner reaches. */
 #define SURFACE 1.4
 
-/* Bytes of one point: three 64-bit positions and their low words; and what sorting it takes. */
+/* Bytes of one point: three 64-bit positions and their low words. */
 #define POINT_BYTES 36.0
-#define SORT_BYTES 40.0
+/* A point that is sorted: key and row, twice. */
+#define SORT_BYTES 24.0
 
 static double power(double x, int32_t n)
 {
@@ -42,49 +44,117 @@ static double set_density(const ascc_plan *plan, int32_t set)
                                                     : 1.0 / power(level->voxel, plan->dimension);
 }
 
-static double level_zero_bytes(const ascc_plan *plan, double fluid, double boundary)
+/* Neighbours of a row inside the fluid, itself included. */
+static double row_length(const ascc_plan *plan, const ascc_rows_key *key)
 {
-    const double d = plan->dimension, all = fluid + boundary;
-    const double state = fluid * d * 8.0 * 6.0 + boundary * d * 8.0 * 2.0;
-    const double features =
-        4.0 * (fluid * plan->fluid_channels + boundary * plan->boundary_channels);
-    return state + features + all * (3.0 * POINT_BYTES + SORT_BYTES + 20.0);
-}
-
-static double level_bytes(const ascc_plan *plan, double all, double points)
-{
-    const double corners = plan->sampling == ASCC_SAMPLING_CORNERS ? 1 << plan->dimension : 0;
-    return all * 80.0 + points * (POINT_BYTES + corners * SORT_BYTES);
+    const double ball = plan->dimension == 2 ? 3.1416 * key->radius * key->radius
+                                             : 4.1888 * key->radius * key->radius * key->radius;
+    const double cube = power(2.0 * key->cube, plan->dimension);
+    const double all = 1.0 + (key->cube > 0.0 ? cube : ball) * set_density(plan, key->source);
+    return key->limit ? fmin(all, key->limit + 1.0) : all;
 }
 
 static double rows_bytes(const ascc_plan *plan, const ascc_rows_key *key, double queries)
 {
-    const double ball = plan->dimension == 2 ? 3.1416 * key->radius * key->radius
-                                             : 4.1888 * key->radius * key->radius * key->radius;
-    double neighbors = 1.0 + ball * set_density(plan, key->source);
-    if (key->limit && neighbors > key->limit + 1.0)
-        neighbors = key->limit + 1.0;
-    return queries * (12.0 + 4.0 * 1.125 * fmax(neighbors, 8.0));
+    return queries * (12.0 + 4.0 * 1.125 * row_length(plan, key));
+}
+
+/* Slots of a set that is sorted again for a radius, and its cells. */
+static double grid_bytes(const ascc_plan *plan, int32_t set, double radius, double points)
+{
+    const double filled = set_density(plan, set) * power(radius, plan->dimension);
+    double smallest, largest;
+    ascc_plan_radii(plan, &smallest, &largest);
+    const bool sorted = set <= ASCC_SET_ALL && radius == smallest;
+    return points * ((sorted ? 0.0 : 16.0) + 12.0 / fmax(1.0, filled));
+}
+
+/* Grids and rows of all searches. */
+static double search_bytes(const ascc_network *network, double fluid, double boundary)
+{
+    const ascc_plan *plan = network->plan;
+    double bytes = 0.0;
+    for (int32_t k = 0; k < network->key_count; k++) {
+        const ascc_rows_key *key = &network->key[k];
+        const double queries = set_points(plan, key->query, fluid, boundary);
+        bytes += rows_bytes(plan, key, queries);
+        bool query_done = false, source_done = false; /* grids are shared */
+        for (int32_t j = 0; j < k; j++) {
+            const ascc_rows_key *old = &network->key[j];
+            const bool same = old->radius == key->radius;
+            query_done |= same && (old->query == key->query || old->source == key->query);
+            source_done |= same && (old->query == key->source || old->source == key->source);
+        }
+        if (!query_done)
+            bytes += grid_bytes(plan, key->query, key->radius, queries);
+        if (!source_done && key->source != key->query)
+            bytes += grid_bytes(plan, key->source, key->radius,
+                                set_points(plan, key->source, fluid, boundary));
+    }
+    return bytes;
+}
+
+static double value_bytes(const ascc_network *network, double fluid, double boundary)
+{
+    double bytes = 0.0;
+    for (int32_t v = 0; v < network->value_count; v++) {
+        const double copies = 4.0 * ((network->wants[v] & 1) + (network->wants[v] >> 1 & 1));
+        bytes += set_points(network->plan, ascc_network_set(network, v), fluid, boundary) *
+                 (1.0 + copies * (double)ascc_padded(ascc_network_channels(network, v)));
+    }
+    return bytes;
+}
+
+/* Lent to a worker for the widest layer: columns of a tile, a row's geometry; roughly. */
+static double layer_bytes(const ascc_plan *plan, double longest)
+{
+    double most = 0.0;
+    for (int32_t t = 0; t < plan->term_count; t++) {
+        const ascc_filter *filter = &plan->term[t].filter;
+        const double cells = (double)filter->cells[0] * filter->cells[1] * filter->cells[2];
+        const double members = filter->bumps ? cells : 0.0;
+        if (ascc_term_searches(&plan->term[t]))
+            most = fmax(most, 24.0 * (cells * (double)ascc_padded(plan->term[t].inputs) + 80.0) +
+                                  (4.0 + members) * longest);
+    }
+    return 4.0 * most;
+}
+
+/* Lent while the points are sorted and sampled. */
+static double hierarchy_bytes(const ascc_plan *plan, double fluid, double boundary)
+{
+    const double all = fluid + boundary;
+    double bytes = boundary * 4.0 + all * (28.0 + SORT_BYTES);
+    for (int32_t l = 1; l < plan->level_count; l++) {
+        const double points = set_points(plan, ASCC_SET_LEVEL + l - 1, fluid, boundary);
+        const bool corners = plan->sampling == ASCC_SAMPLING_CORNERS;
+        const double keys = corners && plan->hysteresis > 0.0 ? 2.0 * all : all;
+        bytes = fmax(bytes, 16.0 * keys + (corners ? 16.0 * (1 << plan->dimension) : 8.0) * points);
+    }
+    return bytes + all * plan->dimension * 8.0;
 }
 
 size_t ascc_estimate_scratch(const ascc_network *network, size_t fluid, size_t boundary,
                              int32_t threads)
 {
     const ascc_plan *plan = network->plan;
-    const double f = (double)fluid, b = (double)boundary;
-    double bytes = level_zero_bytes(plan, f, b);
+    const double f = (double)fluid, b = (double)boundary, all = f + b, d = plan->dimension;
+    double points = 8.0 * d * (5.0 * f + b) + all * (2.0 * POINT_BYTES + 12.0);
     for (int32_t l = 1; l < plan->level_count; l++)
-        bytes += level_bytes(plan, f + b, set_points(plan, ASCC_SET_LEVEL + l - 1, f, b));
-    for (int32_t k = 0; k < network->key_count; k++) {
-        const ascc_rows_key *key = &network->key[k];
-        const double queries = set_points(plan, key->query, f, b);
-        bytes += rows_bytes(plan, key, queries);
-        bytes += SORT_BYTES * (queries + set_points(plan, key->source, f, b));
-    }
-    for (int32_t v = 0; v < network->value_count; v++)
-        bytes += set_points(plan, ascc_network_set(network, v), f, b) *
-                 (1.0 + 4.0 * (double)ascc_padded(ascc_network_channels(network, v)));
-    /* Per thread and layer: columns of a tile, a row being searched. */
-    bytes += (double)threads * (double)(plan->layer_count + 1) * 300e3;
+        points += POINT_BYTES * set_points(plan, ASCC_SET_LEVEL + l - 1, f, b);
+    double longest = 0.0;
+    for (int32_t k = 0; k < network->key_count; k++)
+        longest = fmax(longest, row_length(plan, &network->key[k]));
+    const double features = 4.0 * (f * plan->fluid_channels + b * plan->boundary_channels);
+    const double search = search_bytes(network, f, b);
+    const double forward =
+        features + all * 4.0 + (double)threads * layer_bytes(plan, 1.5 * longest);
+    const bool direct = !plan->output.filter.bumps && !plan->output.radial; /* sums of four */
+    const double last = all * (direct                      ? 41.0
+                               : plan->output.filter.bumps ? 41.0 + 8.0 * d
+                                                           : 9.0 + 8.0 * d);
+    double bytes = fmax(features + hierarchy_bytes(plan, f, b),
+                        search + value_bytes(network, f, b) + fmax(forward, last));
+    bytes = 1.125 * (points + bytes) + 64e3; /* what a block has more; small things */
     return bytes < (double)(SIZE_MAX / 2) ? (size_t)bytes : SIZE_MAX / 2;
 }

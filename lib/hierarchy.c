@@ -30,15 +30,17 @@ static size_t keep_boundary(uint32_t *kept, const ascc_plan *plan, const ascc_sc
 {
     const size_t d = (size_t)plan->dimension;
     double low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY};
-    for (size_t i = 0; i < scene->fluid_count; i++)
+    const bool crops = plan->boundary_crop > 0.0;
+    for (size_t i = 0; crops && scene->boundary_count && i < scene->fluid_count; i++)
         for (size_t c = 0; c < d; c++) {
-            low[c] = fmin(low[c], scene->fluid[i * d + c]);
-            high[c] = fmax(high[c], scene->fluid[i * d + c]);
+            const double x = scene->fluid[i * d + c];
+            low[c] = x < low[c] ? x : low[c];
+            high[c] = x > high[c] ? x : high[c];
         }
     size_t count = 0;
     for (size_t i = 0; i < scene->boundary_count; i++) {
         bool inside = true;
-        for (size_t c = 0; plan->boundary_crop > 0.0 && c < d; c++) {
+        for (size_t c = 0; crops && c < d; c++) {
             const double x = scene->boundary[i * d + c];
             inside &= x >= low[c] - plan->boundary_crop && x <= high[c] + plan->boundary_crop;
         }
@@ -54,84 +56,133 @@ static ascc_status too_far(const ascc_search_tools *tools, const char *kind, siz
                      "%s row %zu is too far from the origin for this model's radius", kind, row);
 }
 
-/* Integer positions of fluid, then kept boundary, in the host's order. */
-static ascc_status convert(ascc_points *points, const ascc_hierarchy *hierarchy,
-                           const ascc_search_tools *tools, int32_t dimension,
-                           const ascc_scene *scene, const uint32_t *kept)
+typedef struct sort_in {
+    ascc_hierarchy *hierarchy;
+    const ascc_scene *scene;
+    int32_t dimension;
+    const uint32_t *kept;  /* boundary rows */
+    const uint32_t *order; /* rows of raw in the order of the set */
+    ascc_points raw;       /* fluid, then kept boundary, in the host's order; no low words */
+    size_t part;
+    size_t first[ASCC_SORT_PARTS]; /* fluid points of a part of the set, then of those before it */
+    atomic_size_t too_far;         /* 1 + smallest row of raw */
+} sort_in;
+
+static void convert(void *data, size_t begin, size_t end, int32_t slot)
 {
-    const size_t d = (size_t)dimension;
-    for (size_t i = 0; i < points->count; i++) {
-        const bool fluid = i < scene->fluid_count;
-        const size_t row = fluid ? i : kept[i - scene->fluid_count];
-        const double *x = (fluid ? scene->fluid : scene->boundary) + row * d;
-        int64_t at[3] = {0};
-        for (size_t c = 0; c < d; c++)
-            if (!ascc_scale_apply(&hierarchy->scale, x[c], &at[c]))
-                return too_far(tools, fluid ? "fluid" : "boundary", row);
-        ascc_points_set(points, i, at);
+    (void)slot;
+    sort_in *job = data;
+    const ascc_scene *scene = job->scene;
+    const size_t d = (size_t)job->dimension;
+    for (size_t i = begin; i < end; i++) {
+        const double *x = i < scene->fluid_count
+                              ? scene->fluid + i * d
+                              : scene->boundary + job->kept[i - scene->fluid_count] * d;
+        bool good = true;
+        for (size_t c = 0; c < 3; c++) {
+            job->raw.position[c][i] = 0;
+            good = good && (c >= d || ascc_scale_apply(&job->hierarchy->scale, x[c],
+                                                       &job->raw.position[c][i]));
+        }
+        if (!good)
+            ascc_note_first(&job->too_far, i);
     }
-    return ASCC_OK;
 }
 
-/* Splits the sorted whole into its two parts and links the rows. */
-static bool split(ascc_hierarchy *h, ascc_arena *arena, size_t kept_count)
+/* Points in the order of the set, the host's rows, and how many are fluid. */
+static void gather(void *data, size_t begin, size_t end, int32_t slot)
 {
-    const ascc_points *all = &h->set[ASCC_SET_ALL];
-    const size_t counts[2] = {h->fluid_count, kept_count};
-    h->part = ascc_arena_take(arena, all->count, sizeof *h->part);
-    if (!h->part)
-        return false;
-    for (int s = 0; s < 2; s++) {
-        h->whole[s] = ascc_arena_take(arena, counts[s], sizeof *h->whole[s]);
-        if (!h->whole[s] || !ascc_points_take(&h->set[s], arena, counts[s]))
-            return false;
+    (void)slot;
+    sort_in *job = data;
+    ascc_hierarchy *h = job->hierarchy;
+    const size_t fluid_count = h->fluid_count;
+    size_t fluid = 0;
+    for (size_t i = begin; i < end; i++) {
+        const size_t row = job->order[i];
+        const int64_t at[3] = {job->raw.position[0][row], job->raw.position[1][row],
+                               job->raw.position[2][row]};
+        ascc_points_set(&h->set[ASCC_SET_ALL], i, at);
+        h->origin[i] = row < fluid_count ? (uint32_t)row
+                                         : (uint32_t)fluid_count + job->kept[row - fluid_count];
+        fluid += row < fluid_count;
     }
-    size_t next[2] = {0, 0};
-    for (size_t i = 0; i < all->count; i++) {
+    job->first[begin / job->part] = fluid;
+}
+
+/* Splits the whole into its two parts and links the rows. */
+static void split(void *data, size_t begin, size_t end, int32_t slot)
+{
+    (void)slot;
+    const sort_in *job = data;
+    ascc_hierarchy *h = job->hierarchy;
+    const ascc_points *all = &h->set[ASCC_SET_ALL];
+    size_t next[2];
+    next[ASCC_SET_FLUID] = job->first[begin / job->part];
+    next[ASCC_SET_BOUNDARY] = begin - next[ASCC_SET_FLUID];
+    for (size_t i = begin; i < end; i++) {
         const int s = h->origin[i] < h->fluid_count ? ASCC_SET_FLUID : ASCC_SET_BOUNDARY;
         const int64_t at[3] = {all->position[0][i], all->position[1][i], all->position[2][i]};
         h->part[i] = (uint32_t)next[s];
         h->whole[s][next[s]] = (uint32_t)i;
         ascc_points_set(&h->set[s], next[s]++, at);
     }
-    return true;
+}
+
+/* Room for the sets of level 0 and the links between their rows. */
+static bool take_sets(ascc_hierarchy *h, ascc_arena *arena, size_t boundary_count)
+{
+    const size_t count = h->fluid_count + boundary_count;
+    h->origin = ascc_arena_take(arena, count, sizeof *h->origin);
+    h->part = ascc_arena_take(arena, count, sizeof *h->part);
+    h->whole[0] = ascc_arena_take(arena, h->fluid_count, sizeof(uint32_t));
+    h->whole[1] = ascc_arena_take(arena, boundary_count, sizeof(uint32_t));
+    return h->origin && h->part && h->whole[0] && h->whole[1] &&
+           ascc_points_take(&h->set[ASCC_SET_ALL], arena, count) &&
+           ascc_points_take(&h->set[ASCC_SET_FLUID], arena, h->fluid_count) &&
+           ascc_points_take(&h->set[ASCC_SET_BOUNDARY], arena, boundary_count);
+}
+
+static bool lend_raw(ascc_points *raw, ascc_arena *arena, size_t count)
+{
+    raw->count = count;
+    for (int c = 0; c < 3; c++)
+        raw->position[c] = ascc_arena_lend(arena, count, sizeof(int64_t));
+    return raw->position[0] && raw->position[1] && raw->position[2];
 }
 
 static ascc_status build_level_zero(ascc_hierarchy *h, const ascc_search_tools *tools,
                                     const ascc_plan *plan, const ascc_scene *scene)
 {
     ascc_arena *arena = tools->arena;
-    ascc_points raw;
-    ascc_extent extent;
-    uint32_t *kept = ascc_arena_take(arena, scene->boundary_count, sizeof *kept);
+    const ascc_arena_mark mark = ascc_arena_mark_of(arena);
+    uint32_t *kept = ascc_arena_lend(arena, scene->boundary_count, sizeof *kept);
     if (!kept)
         return ascc_fail(tools->message, ASCC_ERROR_MEMORY, "no memory for the boundary");
     const size_t kept_count = keep_boundary(kept, plan, scene);
     const size_t count = scene->fluid_count + kept_count;
-    uint32_t *order = ascc_arena_take(arena, count, sizeof *order);
-    h->origin = ascc_arena_take(arena, count, sizeof *h->origin);
-    if (!order || !h->origin || !ascc_points_take(&raw, arena, count) ||
-        !ascc_points_take(&h->set[ASCC_SET_ALL], arena, count))
+    uint32_t *order = ascc_arena_lend(arena, count, sizeof *order);
+    sort_in job = {.hierarchy = h, .scene = scene, .dimension = plan->dimension};
+    job.kept = kept;
+    job.order = order;
+    job.part = ascc_part_size(count);
+    if (!order || !lend_raw(&job.raw, arena, count) || !take_sets(h, arena, kept_count))
         return ascc_fail(tools->message, ASCC_ERROR_MEMORY, "no memory for %zu points", count);
 
-    ascc_status status = convert(&raw, h, tools, plan->dimension, scene, kept);
+    ascc_workers_run(tools->workers, count, 4096, convert, &job);
+    const size_t bad = atomic_load(&job.too_far);
+    if (bad)
+        return bad <= scene->fluid_count
+                   ? too_far(tools, "fluid", bad - 1)
+                   : too_far(tools, "boundary", kept[bad - 1 - scene->fluid_count]);
+    h->extent = ascc_extent_of(&job.raw, tools->workers);
+    const ascc_status status =
+        ascc_points_order(tools, &job.raw, &h->extent, ascc_grid_cell(h->base_radius), order);
     if (status != ASCC_OK)
         return status;
-    ascc_extent_start(&extent);
-    ascc_extent_add(&extent, &raw);
-    status = ascc_points_order(tools, &raw, &extent, ascc_grid_cell(h->base_radius), order);
-    if (status != ASCC_OK)
-        return status;
-    for (size_t i = 0; i < count; i++) {
-        const size_t row = order[i];
-        const int64_t at[3] = {raw.position[0][row], raw.position[1][row], raw.position[2][row]};
-        ascc_points_set(&h->set[ASCC_SET_ALL], i, at);
-        h->origin[i] = row < scene->fluid_count
-                           ? (uint32_t)row
-                           : (uint32_t)scene->fluid_count + kept[row - scene->fluid_count];
-    }
-    if (!split(h, arena, kept_count))
-        return ascc_fail(tools->message, ASCC_ERROR_MEMORY, "no memory for %zu points", count);
+    ascc_workers_run(tools->workers, count, job.part, gather, &job);
+    (void)ascc_part_sums(job.first);
+    ascc_workers_run(tools->workers, count, job.part, split, &job);
+    ascc_arena_return(arena, mark);
     return ASCC_OK;
 }
 
@@ -169,8 +220,7 @@ ascc_status ascc_hierarchy_build(ascc_hierarchy *h, const ascc_search_tools *too
         status = build_level(h, tools, plan, level);
     if (status != ASCC_OK)
         return status;
-    ascc_extent_start(&h->extent);
-    for (int s = ASCC_SET_ALL; s < ASCC_SET_LEVEL + plan->level_count - 1; s++)
+    for (int s = ASCC_SET_LEVEL; s < ASCC_SET_LEVEL + plan->level_count - 1; s++)
         ascc_extent_add(&h->extent, &h->set[s]);
     return ASCC_OK;
 }

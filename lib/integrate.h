@@ -24,13 +24,14 @@ typedef struct ascc_advance {
 } ascc_advance;
 
 /* v* = v + dt g, and where the network sees the particles. errors: RANGE, by fluid row. */
-ascc_status ascc_integrate_begin(const ascc_particles *particles, const ascc_motion *motion,
-                                 ascc_advance *advance, ascc_message *message);
+ascc_status ascc_integrate_begin(ascc_workers *workers, const ascc_particles *particles,
+                                 const ascc_motion *motion, ascc_advance *advance,
+                                 ascc_message *message);
 
 /* New momentum = old + external + impulse, new position from its velocity.
  * errors: RANGE, NOT_FINITE; the message names the particle. */
-ascc_status ascc_integrate_end(const ascc_particles *particles, const ascc_motion *motion,
-                               const int64_t *impulse, ascc_advance *advance,
-                               ascc_message *message);
+ascc_status ascc_integrate_end(ascc_workers *workers, const ascc_particles *particles,
+                               const ascc_motion *motion, const int64_t *impulse,
+                               ascc_advance *advance, ascc_message *message);
 
 #endif

@@ -115,26 +115,34 @@ void ascc_arena_open(ascc_arena *arena, const ascc_allocator *allocator)
     *arena = (ascc_arena){.allocator = allocator};
 }
 
-static void *take_overflow(ascc_arena *arena, size_t size)
+static void *take_overflow(ascc_arena *arena, ascc_arena_overflow **list, size_t size)
 {
     if (size > PTRDIFF_MAX - OVERFLOW_HEADER)
         return NULL;
     ascc_arena_overflow *const piece = ascc_allocate(arena->allocator, 1, OVERFLOW_HEADER + size);
     if (piece == NULL)
         return NULL;
-    piece->next = arena->overflow;
+    piece->next = *list;
     piece->size = OVERFLOW_HEADER + size;
-    arena->overflow = piece;
+    *list = piece;
     return (unsigned char *)piece + OVERFLOW_HEADER;
 }
 
-static void release_overflow(ascc_arena *arena)
+/* Down to the piece that was first in the list then. */
+static void release_overflow(ascc_arena *arena, ascc_arena_overflow **list,
+                             const ascc_arena_overflow *then)
 {
-    while (arena->overflow != NULL) {
-        ascc_arena_overflow *const piece = arena->overflow;
-        arena->overflow = piece->next;
+    while (*list != then) {
+        ascc_arena_overflow *const piece = *list;
+        *list = piece->next;
         ascc_release(arena->allocator, piece, 1, piece->size);
     }
+}
+
+static void release_all_overflow(ascc_arena *arena)
+{
+    release_overflow(arena, &arena->taken_overflow, NULL);
+    release_overflow(arena, &arena->lent_overflow, NULL);
 }
 
 static void release_block(ascc_arena *arena)
@@ -146,33 +154,128 @@ static void release_block(ascc_arena *arena)
 
 void ascc_arena_close(ascc_arena *arena)
 {
-    release_overflow(arena);
+    release_all_overflow(arena);
     release_block(arena);
-    arena->used = arena->needed = 0;
+    arena->front = arena->back = arena->taken = arena->lent = arena->needed = 0;
+}
+
+/* Bytes of a piece, in whole alignments. */
+static bool piece_size(size_t count, size_t element, size_t *size)
+{
+    if (!array_size(count, element, size))
+        return false;
+    *size = (*size + ASCC_ALIGNMENT - 1) & ~(size_t)(ASCC_ALIGNMENT - 1);
+    return true;
+}
+
+/* The part of the block that pieces fill from both ends. */
+static size_t whole_block(const ascc_arena *arena)
+{
+    return arena->block_size & ~(size_t)(ASCC_ALIGNMENT - 1);
+}
+
+static void count_needed(ascc_arena *arena)
+{
+    arena->needed = ascc_max_size(arena->needed, arena->taken + arena->lent);
 }
 
 void *ascc_arena_take(ascc_arena *arena, size_t count, size_t element)
 {
     size_t size;
-    if (!array_size(count, element, &size))
+    if (!piece_size(count, element, &size))
         return NULL;
-    size = (size + ASCC_ALIGNMENT - 1) & ~(size_t)(ASCC_ALIGNMENT - 1);
-
     void *piece;
-    if (size <= arena->block_size - arena->used) {
-        piece = arena->block + arena->used;
-        arena->used += size;
+    if (size <= whole_block(arena) - arena->front - arena->back) {
+        piece = arena->block + arena->front;
+        arena->front += size;
     } else {
-        piece = take_overflow(arena, size);
+        piece = take_overflow(arena, &arena->taken_overflow, size);
     }
-    if (piece != NULL)
-        arena->needed += size;
+    if (piece == NULL)
+        return NULL;
+    arena->taken += size;
+    count_needed(arena);
     return piece;
+}
+
+/* Gives an overflow piece back; false if it is none. */
+static bool drop_overflow(ascc_arena *arena, const void *piece)
+{
+    ascc_arena_overflow **at = &arena->taken_overflow;
+    while (*at != NULL && (unsigned char *)*at + OVERFLOW_HEADER != piece)
+        at = &(*at)->next;
+    ascc_arena_overflow *const found = *at;
+    if (found == NULL)
+        return false;
+    *at = found->next;
+    ascc_release(arena->allocator, found, 1, found->size);
+    return true;
+}
+
+void *ascc_arena_grow(ascc_arena *arena, void *piece, size_t count, size_t grown, size_t element)
+{
+    size_t size = 0, more;
+    if (piece == NULL)
+        return ascc_arena_take(arena, grown, element);
+    if (!piece_size(count, element, &size) || !piece_size(grown, element, &more))
+        return NULL;
+    const size_t needed = arena->needed;
+    const bool last = size <= arena->front && piece == arena->block + (arena->front - size);
+    if (last) {
+        arena->front -= size;
+        arena->taken -= size;
+    }
+    void *moved = ascc_arena_take(arena, grown, element);
+    if (moved == NULL) {
+        arena->front += last ? size : 0;
+        arena->taken += last ? size : 0;
+        return NULL;
+    }
+    if (moved != piece)
+        memcpy(moved, piece, count * element);
+    if (!last && drop_overflow(arena, piece)) {
+        arena->taken -= size;
+        arena->needed = needed;
+        count_needed(arena);
+    }
+    return moved;
+}
+
+void *ascc_arena_lend(ascc_arena *arena, size_t count, size_t element)
+{
+    size_t size;
+    if (!piece_size(count, element, &size))
+        return NULL;
+    void *piece;
+    if (size <= whole_block(arena) - arena->front - arena->back) {
+        arena->back += size;
+        piece = arena->block + whole_block(arena) - arena->back;
+    } else {
+        piece = take_overflow(arena, &arena->lent_overflow, size);
+    }
+    if (piece == NULL)
+        return NULL;
+    arena->lent += size;
+    count_needed(arena);
+    return piece;
+}
+
+ascc_arena_mark ascc_arena_mark_of(const ascc_arena *arena)
+{
+    return (ascc_arena_mark){arena->back, arena->lent, arena->lent_overflow};
+}
+
+void ascc_arena_return(ascc_arena *arena, ascc_arena_mark mark)
+{
+    assert(mark.back <= arena->back && mark.lent <= arena->lent);
+    release_overflow(arena, &arena->lent_overflow, mark.overflow);
+    arena->back = mark.back;
+    arena->lent = mark.lent;
 }
 
 bool ascc_arena_reserve(ascc_arena *arena, size_t size)
 {
-    assert(arena->used == 0 && arena->overflow == NULL);
+    assert(arena->taken == 0 && arena->lent == 0);
     if (size <= arena->block_size)
         return true;
     unsigned char *const block = ascc_allocate(arena->allocator, 1, size);
@@ -186,9 +289,9 @@ bool ascc_arena_reserve(ascc_arena *arena, size_t size)
 
 void ascc_arena_reset(ascc_arena *arena)
 {
-    release_overflow(arena);
+    release_all_overflow(arena);
     const size_t needed = arena->needed;
-    arena->used = arena->needed = 0;
+    arena->front = arena->back = arena->taken = arena->lent = arena->needed = 0;
     if (needed > arena->block_size)
         (void)ascc_arena_reserve(arena, needed + needed / 8); /* else the next step asks again */
 }
@@ -196,7 +299,9 @@ void ascc_arena_reset(ascc_arena *arena)
 size_t ascc_arena_size(const ascc_arena *arena)
 {
     size_t size = arena->block_size;
-    for (const ascc_arena_overflow *piece = arena->overflow; piece != NULL; piece = piece->next)
-        size += piece->size;
+    for (const ascc_arena_overflow *p = arena->taken_overflow; p != NULL; p = p->next)
+        size += p->size;
+    for (const ascc_arena_overflow *p = arena->lent_overflow; p != NULL; p = p->next)
+        size += p->size;
     return size;
 }

@@ -28,11 +28,11 @@ bool ascc_grow(const ascc_allocator *allocator, void **memory, size_t *capacity,
                size_t element);
 
 /*
- * Hands out aligned pieces that live until the next reset.
+ * Hands out aligned pieces: taken ones live until the next reset, lent ones until they are returned.
  *
- *   block:  [ piece | piece | piece |      free      ]    reset: used = 0
+ *   block:  [ taken | taken | taken |    free    | lent | lent ]    reset: all is free
  *   what does not fit goes into overflow blocks; reset replaces block and overflow by one block of
- *   1.125 times what was needed, so a steady user allocates nothing.
+ *   1.125 times what was needed at once, so a steady user allocates nothing.
  */
 typedef struct ascc_arena_overflow ascc_arena_overflow;
 
@@ -40,15 +40,30 @@ typedef struct ascc_arena {
     const ascc_allocator *allocator;
     unsigned char *block;
     size_t block_size;
-    size_t used;   /* of block */
-    size_t needed; /* since the last reset, overflow included */
-    ascc_arena_overflow *overflow;
+    size_t front, back; /* of block: taken and lent */
+    size_t taken, lent; /* overflow included */
+    size_t needed;      /* the most of both together since the last reset */
+    ascc_arena_overflow *taken_overflow, *lent_overflow;
 } ascc_arena;
+
+/* Where lending stood. */
+typedef struct ascc_arena_mark {
+    size_t back, lent;
+    ascc_arena_overflow *overflow;
+} ascc_arena_mark;
 
 void ascc_arena_open(ascc_arena *arena, const ascc_allocator *allocator);
 void ascc_arena_close(ascc_arena *arena);
 /* count elements, not cleared; NULL when there is no memory. */
 void *ascc_arena_take(ascc_arena *arena, size_t count, size_t element);
+/* A taken piece, or NULL, with room for more elements; contents stay. The old piece is given back at
+ * once only if it did not fit into the block or is the last in it. NULL and unchanged without memory. */
+void *ascc_arena_grow(ascc_arena *arena, void *piece, size_t count, size_t grown, size_t element);
+/* Like take, but given back by return. */
+void *ascc_arena_lend(ascc_arena *arena, size_t count, size_t element);
+/* Gives back all that was lent since the mark was read; what was taken in between stays. */
+ascc_arena_mark ascc_arena_mark_of(const ascc_arena *arena);
+void ascc_arena_return(ascc_arena *arena, ascc_arena_mark mark);
 /* Gives back everything handed out. Never fails: without memory for a larger block it keeps the
  * old. */
 void ascc_arena_reset(ascc_arena *arena);

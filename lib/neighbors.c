@@ -48,16 +48,52 @@ void ascc_extent_start(ascc_extent *extent)
     }
 }
 
+static void extent_add_part(ascc_extent *extent, const ascc_points *points, size_t begin,
+                            size_t end)
+{
+    for (int c = 0; c < 3; c++) {
+        const int64_t *p = points->position[c];
+        int64_t low = extent->low[c], high = extent->high[c];
+        for (size_t i = begin; i < end; i++) {
+            low = p[i] < low ? p[i] : low;
+            high = p[i] > high ? p[i] : high;
+        }
+        extent->low[c] = low;
+        extent->high[c] = high;
+    }
+}
+
 void ascc_extent_add(ascc_extent *extent, const ascc_points *points)
 {
-    for (int c = 0; c < 3; c++)
-        for (size_t i = 0; i < points->count; i++) {
-            const int64_t p = points->position[c][i];
-            if (p < extent->low[c])
-                extent->low[c] = p;
-            if (p > extent->high[c])
-                extent->high[c] = p;
+    extent_add_part(extent, points, 0, points->count);
+}
+
+typedef struct extent_job {
+    const ascc_points *points;
+    size_t part;
+    ascc_extent extent[ASCC_SORT_PARTS];
+} extent_job;
+
+static void measure_part(void *data, size_t begin, size_t end, int32_t slot)
+{
+    (void)slot;
+    extent_job *job = data;
+    extent_add_part(&job->extent[begin / job->part], job->points, begin, end);
+}
+
+ascc_extent ascc_extent_of(const ascc_points *points, ascc_workers *workers)
+{
+    extent_job job = {.points = points, .part = ascc_part_size(points->count)};
+    for (size_t p = 0; p < ASCC_SORT_PARTS; p++)
+        ascc_extent_start(&job.extent[p]);
+    ascc_workers_run(workers, points->count, job.part, measure_part, &job);
+    ascc_extent all = job.extent[0];
+    for (size_t p = 1; p < ASCC_SORT_PARTS; p++)
+        for (int c = 0; c < 3; c++) {
+            all.low[c] = job.extent[p].low[c] < all.low[c] ? job.extent[p].low[c] : all.low[c];
+            all.high[c] = job.extent[p].high[c] > all.high[c] ? job.extent[p].high[c] : all.high[c];
         }
+    return all;
 }
 
 /* ---- Cells ---- */
@@ -66,7 +102,9 @@ void ascc_extent_add(ascc_extent *extent, const ascc_points *points)
  * one cell apart in spite of rounding. */
 static inline int64_t cell_of(int64_t position, double inverse_cell)
 {
-    return (int64_t)floor((double)position * inverse_cell);
+    const double x = (double)position * inverse_cell; /* below 2^62: whole numbers fit */
+    const int64_t toward_zero = (int64_t)x;
+    return toward_zero - ((double)toward_zero > x);
 }
 
 double ascc_grid_cell(double radius)
@@ -114,7 +152,7 @@ static inline uint64_t key_of(const ascc_grid *grid, const int64_t cell[3])
 typedef struct key_job {
     const ascc_points *points;
     const ascc_grid *grid;
-    uint64_t *key;
+    ascc_keys keys;
 } key_job;
 
 static void make_keys(void *data, size_t begin, size_t end, int32_t slot)
@@ -126,46 +164,16 @@ static void make_keys(void *data, size_t begin, size_t end, int32_t slot)
         const int64_t cell[3] = {cell_of(job->points->position[0][i], inverse),
                                  cell_of(job->points->position[1][i], inverse),
                                  cell_of(job->points->position[2][i], inverse)};
-        job->key[i] = key_of(job->grid, cell);
+        job->keys.key[i] = key_of(job->grid, cell);
+        if (job->keys.row)
+            job->keys.row[i] = (uint32_t)i;
     }
 }
 
-#define DIGIT_BITS 11
-#define DIGITS (1u << DIGIT_BITS)
-
-/* Stable radix sort of (key, order) pairs by the low `bits` of key; the spare arrays are scratch.
- * Returns the arrays that hold the result through the pointers. */
-static void radix_sort(uint64_t **key, uint32_t **order, uint64_t **spare_key,
-                       uint32_t **spare_order, size_t count, int bits, uint32_t *histogram)
-{
-    for (int shift = 0; shift < bits; shift += DIGIT_BITS) {
-        memset(histogram, 0, DIGITS * sizeof *histogram);
-        for (size_t i = 0; i < count; i++)
-            histogram[(*key)[i] >> shift & (DIGITS - 1)]++;
-        uint32_t sum = 0;
-        for (size_t d = 0; d < DIGITS; d++) {
-            const uint32_t n = histogram[d];
-            histogram[d] = sum;
-            sum += n;
-        }
-        for (size_t i = 0; i < count; i++) {
-            const uint32_t to = histogram[(*key)[i] >> shift & (DIGITS - 1)]++;
-            (*spare_key)[to] = (*key)[i];
-            (*spare_order)[to] = (*order)[i];
-        }
-        uint64_t *swap_key = *key;
-        uint32_t *swap_order = *order;
-        *key = *spare_key;
-        *order = *spare_order;
-        *spare_key = swap_key;
-        *spare_order = swap_order;
-    }
-}
-
-/* Keys of all points and their rows, sorted by key, rows ascending within a key. */
-static ascc_status sort_by_cell(ascc_grid *grid, const ascc_search_tools *tools,
-                                const ascc_points *points, const ascc_extent *extent,
-                                uint64_t **key, uint32_t **order)
+/* Keys of all points, lent; with sort: and their rows, sorted by key, rows ascending within a key. */
+static ascc_status lend_keys(ascc_grid *grid, const ascc_search_tools *tools,
+                             const ascc_points *points, const ascc_extent *extent, bool sort,
+                             ascc_keys *keys)
 {
     int bits;
     if (points->count >= UINT32_MAX)
@@ -174,20 +182,16 @@ static ascc_status sort_by_cell(ascc_grid *grid, const ascc_search_tools *tools,
     if (!key_layout(grid, extent, &bits))
         return ascc_fail(tools->message, ASCC_ERROR_RANGE,
                          "the points span too many cells of %g units to number them", grid->cell);
-    const size_t count = points->count;
-    uint64_t *spare_key = ascc_arena_take(tools->arena, count, sizeof(uint64_t));
-    uint32_t *spare_order = ascc_arena_take(tools->arena, count, sizeof(uint32_t));
-    uint32_t *histogram = ascc_arena_take(tools->arena, DIGITS, sizeof(uint32_t));
-    *key = ascc_arena_take(tools->arena, count, sizeof(uint64_t));
-    *order = ascc_arena_take(tools->arena, count, sizeof(uint32_t));
-    if (!spare_key || !spare_order || !histogram || !*key || !*order)
-        return ascc_fail(tools->message, ASCC_ERROR_MEMORY, "no memory to sort %zu points", count);
-    key_job job = {points, grid, *key};
-    ascc_workers_run(tools->workers, count, 4096, make_keys, &job);
-    for (size_t i = 0; i < count; i++)
-        (*order)[i] = (uint32_t)i;
-    radix_sort(key, order, &spare_key, &spare_order, count, bits, histogram);
-    return ASCC_OK;
+    key_job job = {.points = points, .grid = grid};
+    bool room = ascc_keys_lend(&job.keys, tools->arena, points->count, sort);
+    if (room) {
+        ascc_workers_run(tools->workers, points->count, 4096, make_keys, &job);
+        *keys = job.keys;
+        room = !sort || ascc_keys_sort(keys, tools->arena, tools->workers, bits);
+    }
+    return room ? ASCC_OK
+                : ascc_fail(tools->message, ASCC_ERROR_MEMORY, "no memory to sort %zu points",
+                            points->count);
 }
 
 /* ---- Order within a cell ---- */
@@ -240,76 +244,102 @@ static void sort_cell(const ascc_points *p, uint32_t *order, size_t count)
     }
 }
 
+typedef struct order_job {
+    const ascc_points *points;
+    const ascc_keys *keys;
+    uint32_t *order;
+} order_job;
+
+/* The cells that begin in [begin, end). */
+static void sort_cells(void *data, size_t begin, size_t end, int32_t slot)
+{
+    (void)slot;
+    const order_job *job = data;
+    const uint64_t *key = job->keys->key;
+    const size_t count = job->keys->count;
+    size_t i = begin;
+    while (i > 0 && i < end && key[i] == key[i - 1])
+        i++;
+    const size_t first = i;
+    while (i < end) {
+        size_t stop = i + 1;
+        while (stop < count && key[stop] == key[i])
+            stop++;
+        sort_cell(job->points, job->keys->row + i, stop - i);
+        i = stop;
+    }
+    if (first < i)
+        memcpy(job->order + first, job->keys->row + first, (i - first) * sizeof *job->order);
+}
+
 ascc_status ascc_points_order(const ascc_search_tools *tools, const ascc_points *points,
                               const ascc_extent *extent, double cell, uint32_t *order)
 {
+    const ascc_arena_mark mark = ascc_arena_mark_of(tools->arena);
     ascc_grid grid = {.cell = cell};
-    uint64_t *key;
-    uint32_t *sorted;
-    const ascc_status status = sort_by_cell(&grid, tools, points, extent, &key, &sorted);
+    ascc_keys keys;
+    const ascc_status status = lend_keys(&grid, tools, points, extent, true, &keys);
     if (status != ASCC_OK)
         return status;
-    for (size_t i = 0; i < points->count;) {
-        size_t end = i + 1;
-        while (end < points->count && key[end] == key[i])
-            end++;
-        sort_cell(points, sorted + i, end - i);
-        i = end;
-    }
-    memcpy(order, sorted, points->count * sizeof *order);
+    order_job job = {points, &keys, order};
+    ascc_workers_run(tools->workers, points->count, 2048, sort_cells, &job);
+    ascc_arena_return(tools->arena, mark);
     return ASCC_OK;
+}
+
+typedef struct slots_job {
+    const ascc_points *points;
+    const ascc_keys *keys;
+    ascc_grid *grid;
+} slots_job;
+
+/* What kernels read, in the order of slots. */
+static void fill_slots(void *data, size_t begin, size_t end, int32_t slot)
+{
+    (void)slot;
+    const slots_job *job = data;
+    for (size_t s = begin; s < end; s++) {
+        const uint32_t row = job->grid->order[s] = job->keys->row[s];
+        for (int c = 0; c < 3; c++)
+            job->grid->low[c][s] = job->points->low[c][row];
+    }
 }
 
 ascc_status ascc_grid_build(ascc_grid *grid, const ascc_search_tools *tools,
                             const ascc_points *points, const ascc_extent *extent, double radius,
                             bool sorted)
 {
-    const size_t count = points->count;
-    uint64_t *key;
-    uint32_t *order;
-    grid->count = count;
+    const ascc_arena_mark mark = ascc_arena_mark_of(tools->arena);
+    ascc_keys keys;
+    grid->count = points->count;
     grid->cell = ascc_grid_cell(radius);
-    if (sorted) {
-        int bits;
-        if (!key_layout(grid, extent, &bits))
-            return ascc_fail(tools->message, ASCC_ERROR_RANGE,
-                             "the points span too many cells of %g units to number them",
-                             grid->cell);
-        key = ascc_arena_take(tools->arena, count, sizeof *key);
-        if (!key)
-            return ascc_fail(tools->message, ASCC_ERROR_MEMORY, "no memory for %zu cells", count);
-        key_job job = {points, grid, key};
-        ascc_workers_run(tools->workers, count, 4096, make_keys, &job);
-        grid->order = NULL;
-        for (int c = 0; c < 3; c++)
-            grid->low[c] = points->low[c];
-    } else {
-        const ascc_status status = sort_by_cell(grid, tools, points, extent, &key, &order);
-        if (status != ASCC_OK)
-            return status;
-        grid->order = order;
+    grid->order = NULL;
+    for (int c = 0; c < 3; c++)
+        grid->low[c] = points->low[c];
+    const ascc_status status = lend_keys(grid, tools, points, extent, !sorted, &keys);
+    if (status != ASCC_OK)
+        return status;
+    bool room = true;
+    if (!sorted) {
+        grid->order = ascc_arena_take(tools->arena, grid->count, sizeof *grid->order);
         for (int c = 0; c < 3; c++) {
-            grid->low[c] = ascc_arena_take(tools->arena, count, sizeof(int32_t));
-            if (!grid->low[c])
-                return ascc_fail(tools->message, ASCC_ERROR_MEMORY, "no memory for %zu points",
-                                 count);
-            for (size_t s = 0; s < count; s++)
-                grid->low[c][s] = points->low[c][order[s]];
+            grid->low[c] = ascc_arena_take(tools->arena, grid->count, sizeof *grid->low[c]);
+            room &= grid->low[c] != NULL;
         }
+        room &= grid->order != NULL;
+        slots_job job = {points, &keys, grid};
+        if (room)
+            ascc_workers_run(tools->workers, grid->count, 4096, fill_slots, &job);
     }
-    /* Keys are compacted in place: the cell list never overtakes the point list. */
-    grid->start = ascc_arena_take(tools->arena, count + 1, sizeof *grid->start);
-    if (!grid->start)
-        return ascc_fail(tools->message, ASCC_ERROR_MEMORY, "no memory for %zu cells", count);
-    size_t cells = 0;
-    for (size_t s = 0; s < count; s++)
-        if (s == 0 || key[s] != key[cells - 1]) {
-            grid->start[cells] = (uint32_t)s;
-            key[cells++] = key[s];
-        }
-    grid->start[cells] = (uint32_t)count;
-    grid->key = key;
-    grid->cell_count = cells;
+    ascc_distinct cells;
+    room = room && ascc_keys_distinct(&keys, tools->arena, tools->workers, ascc_arena_take, &cells);
+    if (!room)
+        return ascc_fail(tools->message, ASCC_ERROR_MEMORY, "no memory for a grid of %zu points",
+                         grid->count);
+    grid->key = cells.key;
+    grid->start = cells.start;
+    grid->cell_count = cells.count;
+    ascc_arena_return(tools->arena, mark);
     return ASCC_OK;
 }
 
@@ -348,8 +378,7 @@ ascc_status ascc_rows_open(ascc_rows *rows, const ascc_search_tools *tools, size
     if (!rows->count || !rows->start)
         return ascc_fail(tools->message, ASCC_ERROR_MEMORY, "no memory for %zu neighbour rows",
                          count);
-    for (size_t i = 0; i < count; i++)
-        rows->count[i] = ASCC_ROW_ABSENT;
+    memset(rows->count, 0xff, count * sizeof *rows->count); /* ASCC_ROW_ABSENT */
     rows->neighbor = NULL;
     rows->capacity = expected;
     return ASCC_OK;
@@ -358,11 +387,10 @@ ascc_status ascc_rows_open(ascc_rows *rows, const ascc_search_tools *tools, size
 /* Room for `capacity` neighbours, the `used` ones kept. */
 static bool rows_reserve(ascc_rows *rows, ascc_arena *arena, size_t capacity)
 {
-    uint32_t *neighbor = ascc_arena_take(arena, capacity, sizeof *neighbor);
+    uint32_t *neighbor = ascc_arena_grow(arena, rows->neighbor, rows->neighbor ? rows->capacity : 0,
+                                         capacity, sizeof *neighbor);
     if (!neighbor)
         return false;
-    if (rows->used)
-        memcpy(neighbor, rows->neighbor, rows->used * sizeof *neighbor);
     rows->neighbor = neighbor;
     rows->capacity = capacity;
     return true;
@@ -507,7 +535,7 @@ static bool search_run(const rows_job *job, size_t begin, size_t end, const int3
 }
 
 /* Neighbours a worker sets aside at once, so that threads seldom meet at the counter. */
-#define SET_ASIDE 2048
+#define SET_ASIDE 512
 
 /* What a worker has set aside and not used; its longest row, and all it stored. */
 typedef struct room {
@@ -655,13 +683,14 @@ ascc_status ascc_rows_make(ascc_rows *rows, const ascc_search_tools *tools, cons
         if (rows->neighbor)
             return ASCC_OK;
     }
+    const ascc_arena_mark mark = ascc_arena_mark_of(tools->arena);
     const size_t slots = (size_t)ascc_workers_count(tools->workers);
     rows_job job = {.rows = rows, .tools = tools, .wanted = wanted};
     job.scratch_size = (size_t)rows->max_neighbors + SEARCH_CHUNK + 32;
-    job.scratch = ascc_arena_take(tools->arena, slots * job.scratch_size, sizeof *job.scratch);
+    job.scratch = ascc_arena_lend(tools->arena, slots * job.scratch_size, sizeof *job.scratch);
     if (rows->limit) {
-        job.cut = ascc_arena_take(tools->arena, rows->query->count, sizeof *job.cut);
-        job.heap = ascc_arena_take(tools->arena, slots * (size_t)rows->limit, sizeof *job.heap);
+        job.cut = ascc_arena_lend(tools->arena, rows->query->count, sizeof *job.cut);
+        job.heap = ascc_arena_lend(tools->arena, slots * (size_t)rows->limit, sizeof *job.heap);
     }
     if (!job.scratch || (rows->limit && (!job.cut || !job.heap)))
         return ascc_fail(tools->message, ASCC_ERROR_MEMORY, "no memory for a neighbour search");
@@ -672,7 +701,7 @@ ascc_status ascc_rows_make(ascc_rows *rows, const ascc_search_tools *tools, cons
     size_t needed = atomic_load(&job.used);
     while (status == ASCC_OK && needed > rows->capacity) {
         rows->used = rows->capacity; /* whole rows below it are kept, with holes at the end */
-        if (!rows_reserve(rows, tools->arena, needed + needed / 8 + rows->capacity))
+        if (!rows_reserve(rows, tools->arena, needed + needed / 8))
             return ascc_fail(tools->message, ASCC_ERROR_MEMORY, "no memory for %zu neighbours",
                              needed);
         status = rows_pass(&job);
@@ -685,5 +714,6 @@ ascc_status ascc_rows_make(ascc_rows *rows, const ascc_search_tools *tools, cons
     rows->stored += atomic_load(&job.stored);
     if (mutual)
         ascc_workers_run(tools->workers, rows->query->count, 256, drop_one_sided, &job);
+    ascc_arena_return(tools->arena, mark);
     return ASCC_OK;
 }

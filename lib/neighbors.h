@@ -14,6 +14,7 @@
 #include <stdatomic.h>
 
 #include "context.h"
+#include "sort.h"
 
 /* How lengths become integers: one unit is 2^exponent metres (or whatever the caller measures in). */
 typedef struct ascc_scale {
@@ -65,6 +66,8 @@ typedef struct ascc_extent {
 
 void ascc_extent_start(ascc_extent *extent);
 void ascc_extent_add(ascc_extent *extent, const ascc_points *points);
+/* The box of one set, found on all workers. */
+ascc_extent ascc_extent_of(const ascc_points *points, ascc_workers *workers);
 
 /* What a search or sort works with. */
 typedef struct ascc_search_tools {
@@ -108,7 +111,7 @@ typedef struct ascc_rows {
     uint32_t longest;
 } ascc_rows;
 
-/* Sets up rows without any made. expected: neighbours to make room for at first. */
+/* Sets up rows without any made. expected: neighbours to make room for at first; 0 = count them first. */
 ascc_status ascc_rows_open(ascc_rows *rows, const ascc_search_tools *tools, size_t expected);
 
 /* Makes the rows of queries with wanted[row] != 0 (NULL = all) that are not made yet.

@@ -243,8 +243,7 @@ static ascc_status open_rows(ascc_network_run *run)
             status =
                 ascc_hierarchy_grid(h, run->tools, key->source, rows->radius, &rows->source_grid);
         if (status == ASCC_OK)
-            status = ascc_rows_open(rows, run->tools,
-                                    ascc_max_size(key->expected, rows->query->count * 8));
+            status = ascc_rows_open(rows, run->tools, key->expected);
         if (status != ASCC_OK)
             return status;
     }
@@ -311,6 +310,21 @@ static void mark_neighbors(void *data, size_t begin, size_t end, int32_t slot)
     atomic_fetch_sub_explicit(&job->left, marked, memory_order_relaxed);
 }
 
+/* A row that searches its own set finds itself: marked first, which mostly leaves none to mark. */
+static void mark_own(void *data, size_t begin, size_t end, int32_t slot)
+{
+    (void)slot;
+    mark_job *job = data;
+    const bool own = job->rows->same && !job->rows->skip_self;
+    size_t left = 0;
+    for (size_t i = begin; i < end; i++) {
+        if (own && job->active[i])
+            job->source[i] = 1;
+        left += !job->source[i];
+    }
+    atomic_fetch_add_explicit(&job->left, left, memory_order_relaxed);
+}
+
 /* Makes the rows of the active queries and marks what they read. */
 static ascc_status demand_rows(ascc_network_run *run, int32_t key, const uint8_t *active,
                                uint8_t *source)
@@ -319,11 +333,10 @@ static ascc_status demand_rows(ascc_network_run *run, int32_t key, const uint8_t
     const ascc_status status = ascc_rows_make(rows, run->tools, active);
     if (status != ASCC_OK)
         return status;
-    size_t left = 0;
-    for (size_t i = 0; i < rows->source->count; i++)
-        left += !source[i];
-    mark_job job = {rows, active, source, left};
-    ascc_workers_run(run->tools->workers, rows->query->count, 1024, mark_neighbors, &job);
+    mark_job job = {.rows = rows, .active = active, .source = source};
+    ascc_workers_run(run->tools->workers, rows->source->count, 8192, mark_own, &job);
+    if (atomic_load(&job.left))
+        ascc_workers_run(run->tools->workers, rows->query->count, 1024, mark_neighbors, &job);
     return ASCC_OK;
 }
 
@@ -339,7 +352,7 @@ static ascc_status demand_output(ascc_network_run *run)
     const int32_t key = network->term_key[network->plan->term_count];
     if (key < 0)
         return ASCC_OK;
-    uint8_t *fluid = ascc_arena_take(run->tools->arena, h->set[set].count, 1);
+    uint8_t *fluid = ascc_arena_lend(run->tools->arena, h->set[set].count, 1);
     if (!fluid)
         return ascc_fail(run->tools->message, ASCC_ERROR_MEMORY, "no memory for the last layer");
     memcpy(fluid, active, h->set[set].count);
@@ -630,15 +643,62 @@ static bool take_value(ascc_network_run *run, int32_t v)
     return true;
 }
 
+typedef struct features_job {
+    const ascc_network_run *run;
+    int32_t value;
+    const float *features;
+} features_job;
+
 /* Features come in the host's order; values are in the order of the set. */
-static void place_features(ascc_network_run *run, int32_t v, const float *features)
+static void place_features(void *data, size_t begin, size_t end, int32_t slot)
 {
-    const ascc_hierarchy *h = run->hierarchy;
-    const int32_t channels = ascc_network_channels(run->network, v);
-    for (size_t i = 0; i < h->set[v].count; i++) {
+    (void)slot;
+    const features_job *job = data;
+    const int32_t v = job->value;
+    const ascc_hierarchy *h = job->run->hierarchy;
+    const int32_t channels = ascc_network_channels(job->run->network, v);
+    for (size_t i = begin; i < end; i++) {
         const size_t row = h->origin[h->whole[v][i]] - (v == 0 ? 0 : h->fluid_count);
-        store_row(&run->value[v], i, features + row * (size_t)channels, channels);
+        store_row(&job->run->value[v], i, job->features + row * (size_t)channels, channels);
     }
+}
+
+typedef struct list_job {
+    const uint8_t *active;
+    uint32_t *list;
+    size_t part;
+    size_t first[ASCC_SORT_PARTS]; /* how many, then where the first goes */
+} list_job;
+
+static void count_active(void *data, size_t begin, size_t end, int32_t slot)
+{
+    (void)slot;
+    list_job *job = data;
+    size_t count = 0;
+    for (size_t i = begin; i < end; i++)
+        count += job->active[i];
+    job->first[begin / job->part] = count;
+}
+
+static void list_part(void *data, size_t begin, size_t end, int32_t slot)
+{
+    (void)slot;
+    const list_job *job = data;
+    uint32_t *next = job->list + job->first[begin / job->part];
+    for (size_t i = begin; i < end; i++)
+        if (job->active[i])
+            *next++ = (uint32_t)i;
+}
+
+/* Lists the active rows; returns how many. */
+static size_t list_active(const ascc_search_tools *tools, const uint8_t *active, size_t rows,
+                          uint32_t *list)
+{
+    list_job job = {.active = active, .list = list, .part = ascc_part_size(rows)};
+    ascc_workers_run(tools->workers, rows, job.part, count_active, &job);
+    const size_t count = ascc_part_sums(job.first);
+    ascc_workers_run(tools->workers, rows, job.part, list_part, &job);
+    return count;
 }
 
 static ascc_status compute_layer(ascc_network_run *run, int32_t l, uint32_t *list)
@@ -654,18 +714,17 @@ static ascc_status compute_layer(ascc_network_run *run, int32_t l, uint32_t *lis
     job.geometry_offset = job.tile_offset + TILE_ROWS * job.width;
     job.scratch_size = job.geometry_offset + job.sizes.scratch;
     const size_t numbers = job.sizes.relative ? job.sizes.room : 0;
-    job.sequence = ascc_arena_take(tools->arena, numbers, sizeof *job.sequence);
+    const ascc_arena_mark mark = ascc_arena_mark_of(tools->arena);
+    job.sequence = ascc_arena_lend(tools->arena, numbers, sizeof *job.sequence);
     for (size_t i = 0; job.sequence && i < numbers; i++)
         job.sequence[i] = (uint32_t)i;
-    job.scratch = ascc_arena_take(tools->arena, slots * job.scratch_size, sizeof(float));
+    job.scratch = ascc_arena_lend(tools->arena, slots * job.scratch_size, sizeof(float));
     if (!job.scratch || !job.sequence || !take_value(run, l + 2))
         return ascc_fail(tools->message, ASCC_ERROR_MEMORY, "no memory for layer %s", layer->name);
-    size_t count = 0;
-    const size_t rows = run->hierarchy->set[layer->set].count;
-    for (size_t i = 0; i < rows; i++)
-        if (run->value[l + 2].active[i])
-            list[count++] = (uint32_t)i;
+    const size_t count =
+        list_active(tools, run->value[l + 2].active, run->hierarchy->set[layer->set].count, list);
     ascc_workers_run(tools->workers, count, TILE_ROWS * 4, compute_tiles, &job);
+    ascc_arena_return(tools->arena, mark);
     return ASCC_OK;
 }
 
@@ -676,11 +735,14 @@ ascc_status ascc_network_forward(ascc_network_run *run, const float *fluid_featu
     size_t most = 0;
     for (int s = 0; s < ASCC_MAX_SETS; s++)
         most = ascc_max_size(most, run->hierarchy->set[s].count);
-    uint32_t *list = ascc_arena_take(run->tools->arena, most, sizeof *list);
+    uint32_t *list = ascc_arena_lend(run->tools->arena, most, sizeof *list);
     if (!list || !take_value(run, 0) || !take_value(run, 1))
         return ascc_fail(run->tools->message, ASCC_ERROR_MEMORY, "no memory for the features");
-    place_features(run, 0, fluid_features);
-    place_features(run, 1, boundary_features);
+    for (int32_t v = 0; v < 2; v++) {
+        features_job job = {run, v, v == 0 ? fluid_features : boundary_features};
+        ascc_workers_run(run->tools->workers, run->hierarchy->set[v].count, 4096, place_features,
+                         &job);
+    }
     ascc_status status = ASCC_OK;
     for (int32_t l = 0; status == ASCC_OK && l < network->plan->layer_count; l++)
         status = compute_layer(run, l, list);

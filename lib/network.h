@@ -30,7 +30,7 @@ typedef struct ascc_network {
     int32_t key_count;
     ascc_rows_key *key; /* [term_count + 2] */
     int32_t *term_key;  /* [term_count + 1], last: the output; -1 = none */
-    uint8_t *wants;     /* [value_count] WANTS_* */
+    uint8_t *wants;     /* [value_count] WANTS_*: a bit for each copy of the value */
     /* Weights as the kernels read them, channels filled up to multiples of 8: convolutions
      * [cell][inputs][outputs], dense [inputs][outputs], an antisymmetric output [cell][dimension][inputs] or,
      * with a basis, [inputs][8 bumps] */

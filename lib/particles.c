@@ -90,11 +90,6 @@ static source repeated(const char *name, const double *value)
     return (source){name, (const unsigned char *)value, 0, 0, true};
 }
 
-static bool is_scalar(ascc_scalar scalar)
-{
-    return scalar == ASCC_FLOAT || scalar == ASCC_DOUBLE;
-}
-
 /* The host's array as a source; without rows any array will do. */
 static ascc_status open_source(ascc_particles *particles, const char *name,
                                const ascc_const_array *array, size_t count, int32_t components,
@@ -106,7 +101,7 @@ static ascc_status open_source(ascc_particles *particles, const char *name,
         return ASCC_OK;
     if (array == NULL || array->data == NULL)
         return ascc_particles_fail(particles, ASCC_ERROR_ARGUMENT, "%s: NULL", name);
-    if (!is_scalar(array->scalar) || array->reserved != 0)
+    if (!ascc_scalar_known(array->scalar) || array->reserved != 0)
         return ascc_particles_fail(particles, ASCC_ERROR_ARGUMENT,
                                    "%s: scalar %d, reserved %ld: not an array known here", name,
                                    (int)array->scalar, (long)array->reserved);
@@ -933,7 +928,7 @@ ascc_status ascc_particles_get(const ascc_particles *particles, ascc_kind kind, 
     const ascc_status status = check_rows(particles, kind, field, first, count);
     if (status != ASCC_OK || count == 0)
         return status;
-    if (values == NULL || values->data == NULL || !is_scalar(values->scalar) ||
+    if (values == NULL || values->data == NULL || !ascc_scalar_known(values->scalar) ||
         values->reserved != 0)
         return ascc_particles_fail(ascc_particles_writable(particles), ASCC_ERROR_ARGUMENT,
                                    "values: NULL, or not an array known here");

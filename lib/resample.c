@@ -1,4 +1,4 @@
-/* Voxelisation by sorting cell keys, and farthest point sampling. SPDX-License-Identifier: MIT */
+/* Voxelisation by sorting their keys, and farthest point sampling. SPDX-License-Identifier: MIT */
 #include "resample.h"
 
 #include <math.h>
@@ -20,174 +20,224 @@ void ascc_centroid(const ascc_points *points, double center[3])
     }
 }
 
-/* Integer cells and the box they span. */
-typedef struct cells {
-    size_t count;
-    int64_t *at; /* [count][3] */
-    int64_t low[3], high[3];
-} cells;
+/* Voxels as keys: z, y, x from the highest bits down, counted from the lowest of each. */
+typedef struct voxels {
+    int64_t low[3];
+    int shift_y, shift_z, bits;
+    ascc_keys keys;
+} voxels;
 
-static bool cells_take(cells *list, ascc_arena *arena, size_t count)
+static ascc_status no_memory(const ascc_search_tools *tools)
 {
-    list->count = 0;
-    for (int c = 0; c < 3; c++) {
-        list->low[c] = INT64_MAX;
-        list->high[c] = INT64_MIN;
-    }
-    list->at = ascc_arena_take(arena, count * 3, sizeof *list->at);
-    return list->at != NULL;
+    return ascc_fail(tools->message, ASCC_ERROR_MEMORY, "no memory for voxels");
 }
 
-static void cells_add(cells *list, const int64_t at[3])
-{
-    for (int c = 0; c < 3; c++) {
-        list->at[list->count * 3 + (size_t)c] = at[c];
-        if (at[c] < list->low[c])
-            list->low[c] = at[c];
-        if (at[c] > list->high[c])
-            list->high[c] = at[c];
-    }
-    list->count++;
-}
-
-static int width_of(const cells *list, int c)
+static int width_of(int64_t low, int64_t high)
 {
     int bits = 0;
-    for (uint64_t span = (uint64_t)(list->high[c] - list->low[c]); span; span >>= 1)
+    for (uint64_t span = (uint64_t)high - (uint64_t)low; span; span >>= 1)
         bits++;
     return bits;
 }
 
-/* Sorts by z, y, x and drops repeated cells. */
-static ascc_status cells_unique(cells *list, const ascc_search_tools *tools)
+/* Keys for the voxels from low to high. errors: RANGE. */
+static ascc_status lay_out(voxels *v, const ascc_search_tools *tools, const int64_t low[3],
+                           const int64_t high[3])
 {
-    if (!list->count)
-        return ASCC_OK;
-    const int shift_y = width_of(list, 0), shift_z = shift_y + width_of(list, 1);
-    const int bits = shift_z + width_of(list, 2);
-    if (bits > 64)
+    memcpy(v->low, low, sizeof v->low);
+    v->shift_y = width_of(low[0], high[0]);
+    v->shift_z = v->shift_y + width_of(low[1], high[1]);
+    v->bits = v->shift_z + width_of(low[2], high[2]);
+    if (v->bits > 64)
         return ascc_fail(tools->message, ASCC_ERROR_RANGE,
                          "the points span too many voxels to number them");
-    uint64_t *key = ascc_arena_take(tools->arena, list->count, sizeof *key);
-    uint64_t *spare = ascc_arena_take(tools->arena, list->count, sizeof *spare);
-    if (!key || !spare)
-        return ascc_fail(tools->message, ASCC_ERROR_MEMORY, "no memory to sort %zu voxels",
-                         list->count);
-    for (size_t i = 0; i < list->count; i++) {
-        const int64_t *at = list->at + i * 3;
-        key[i] = (uint64_t)(at[0] - list->low[0]);
-        if (shift_y < 64)
-            key[i] |= (uint64_t)(at[1] - list->low[1]) << shift_y;
-        if (shift_z < 64)
-            key[i] |= (uint64_t)(at[2] - list->low[2]) << shift_z;
-    }
-    uint32_t histogram[256];
-    for (int shift = 0; shift < bits; shift += 8) {
-        memset(histogram, 0, sizeof histogram);
-        for (size_t i = 0; i < list->count; i++)
-            histogram[key[i] >> shift & 255]++;
-        uint32_t sum = 0;
-        for (size_t d = 0; d < 256; d++) {
-            const uint32_t n = histogram[d];
-            histogram[d] = sum;
-            sum += n;
-        }
-        for (size_t i = 0; i < list->count; i++)
-            spare[histogram[key[i] >> shift & 255]++] = key[i];
-        uint64_t *swap = key;
-        key = spare;
-        spare = swap;
-    }
-    const uint64_t mask_x = shift_y ? UINT64_MAX >> (64 - shift_y) : 0;
-    const int width_y = shift_z - shift_y;
-    const uint64_t mask_y = width_y ? UINT64_MAX >> (64 - width_y) : 0;
-    size_t kept = 0;
-    for (size_t i = 0; i < list->count; i++) {
-        if (i && key[i] == key[i - 1])
-            continue;
-        int64_t *at = list->at + 3 * kept++;
-        at[0] = list->low[0] + (int64_t)(key[i] & mask_x);
-        at[1] = list->low[1] + (int64_t)(shift_y < 64 ? key[i] >> shift_y & mask_y : 0);
-        at[2] = list->low[2] + (int64_t)(shift_z < 64 ? key[i] >> shift_z : 0);
-    }
-    list->count = kept;
     return ASCC_OK;
 }
 
-/* Points at (cell + offset) * voxel + anchor; z stays 0 in 2D. */
-static ascc_status place(ascc_points *samples, const ascc_search_tools *tools, const cells *list,
-                         int32_t dimension, double voxel, double offset, const double anchor[3])
+static inline uint64_t shifted(uint64_t x, int shift)
 {
-    if (!ascc_points_take(samples, tools->arena, list->count))
-        return ascc_fail(tools->message, ASCC_ERROR_MEMORY, "no memory for %zu coarse points",
-                         list->count);
-    for (size_t i = 0; i < list->count; i++) {
-        int64_t at[3] = {0};
-        for (int c = 0; c < dimension; c++)
-            at[c] =
-                (int64_t)rint(((double)list->at[i * 3 + (size_t)c] + offset) * voxel + anchor[c]);
-        ascc_points_set(samples, i, at);
+    return shift < 64 ? x << shift : 0; /* then x is 0 */
+}
+
+static inline uint64_t voxel_key(const voxels *v, const int64_t at[3])
+{
+    return (uint64_t)(at[0] - v->low[0]) | shifted((uint64_t)(at[1] - v->low[1]), v->shift_y) |
+           shifted((uint64_t)(at[2] - v->low[2]), v->shift_z);
+}
+
+static inline uint64_t field(uint64_t key, int from, int to)
+{
+    return from == to ? 0 : key << (64 - to) >> (64 - to) >> from;
+}
+
+/* ---- From points to voxels ---- */
+
+typedef struct voxel_job {
+    const ascc_points *points;
+    int32_t dimension;
+    double voxel, hysteresis, anchor[3];
+    bool corners; /* else centers */
+    const ascc_distinct *occupied;
+    voxels *voxels;
+} voxel_job;
+
+static inline int64_t floor_of(double x)
+{
+    const int64_t toward_zero = (int64_t)x;
+    return toward_zero - ((double)toward_zero > x);
+}
+
+/* Voxels of a coordinate: two where hysteresis makes them differ. Both grow with the position. */
+static inline void voxel_of(const voxel_job *job, int c, int64_t position, int64_t *lower,
+                            int64_t *upper)
+{
+    if (c >= job->dimension) {
+        *lower = *upper = 0;
+    } else if (job->corners) {
+        const double u = ((double)position - job->anchor[c]) / job->voxel;
+        *lower = floor_of(u - job->hysteresis);
+        *upper = floor_of(u + job->hysteresis);
+    } else {
+        *lower = *upper = floor_of((double)position * (1.0 / job->voxel));
     }
+}
+
+/* One key for each point, or two. */
+static void make_voxels(void *data, size_t begin, size_t end, int32_t slot)
+{
+    (void)slot;
+    const voxel_job *job = data;
+    const size_t each = job->voxels->keys.count / job->points->count;
+    for (size_t i = begin; i < end; i++) {
+        int64_t lower[3], upper[3];
+        for (int c = 0; c < 3; c++)
+            voxel_of(job, c, job->points->position[c][i], &lower[c], &upper[c]);
+        job->voxels->keys.key[i * each] = voxel_key(job->voxels, lower);
+        if (each == 2)
+            job->voxels->keys.key[i * each + 1] = voxel_key(job->voxels, upper);
+    }
+}
+
+/* The corners of the voxels [begin, end). */
+static void make_corners(void *data, size_t begin, size_t end, int32_t slot)
+{
+    (void)slot;
+    const voxel_job *job = data;
+    const voxels *v = job->voxels;
+    const uint64_t y = shifted(1, v->shift_y), z = shifted(1, v->shift_z);
+    const size_t corners = (size_t)1 << job->dimension;
+    for (size_t i = begin; i < end; i++)
+        for (size_t k = 0; k < corners; k++)
+            v->keys.key[i * corners + k] =
+                job->occupied->key[i] + (k & 1) + (k >> 1 & 1) * y + (k >> 2 & 1) * z;
+}
+
+/* Sorted voxels without repeats, lent. errors: MEMORY. */
+static ascc_status sort_voxels(voxels *v, const ascc_search_tools *tools, ascc_distinct *distinct)
+{
+    if (!ascc_keys_sort(&v->keys, tools->arena, tools->workers, v->bits) ||
+        !ascc_keys_distinct(&v->keys, tools->arena, tools->workers, ascc_arena_lend, distinct))
+        return no_memory(tools);
+    return ASCC_OK;
+}
+
+static ascc_status occupied_voxels(const voxel_job *job, const ascc_search_tools *tools,
+                                   ascc_distinct *distinct)
+{
+    const ascc_extent extent = ascc_extent_of(job->points, tools->workers);
+    int64_t low[3] = {0}, high[3] = {0}, other;
+    for (int c = 0; c < job->dimension && job->points->count; c++) {
+        voxel_of(job, c, extent.low[c], &low[c], &other);
+        voxel_of(job, c, extent.high[c], &other, &high[c]);
+        high[c] += job->corners; /* the corner above */
+    }
+    const ascc_status status = lay_out(job->voxels, tools, low, high);
+    if (status != ASCC_OK)
+        return status;
+    const size_t each = job->corners && job->hysteresis != 0.0 ? 2 : 1;
+    if (!ascc_keys_lend(&job->voxels->keys, tools->arena, each * job->points->count, false))
+        return no_memory(tools);
+    ascc_workers_run(tools->workers, job->points->count, 4096, make_voxels, (void *)job);
+    return sort_voxels(job->voxels, tools, distinct);
+}
+
+static ascc_status corners_of(voxel_job *job, const ascc_search_tools *tools,
+                              const ascc_distinct *occupied, ascc_distinct *distinct)
+{
+    job->occupied = occupied;
+    const size_t corners = (size_t)1 << job->dimension;
+    if (!ascc_keys_lend(&job->voxels->keys, tools->arena, corners * occupied->count, false))
+        return no_memory(tools);
+    ascc_workers_run(tools->workers, occupied->count, 1024, make_corners, job);
+    return sort_voxels(job->voxels, tools, distinct);
+}
+
+/* ---- From voxels to points ---- */
+
+typedef struct place_job {
+    const voxel_job *from;
+    const ascc_distinct *list;
+    ascc_points *samples;
+} place_job;
+
+/* Points at (voxel + offset) * edge + anchor; z stays 0 in 2D. */
+static void place(void *data, size_t begin, size_t end, int32_t slot)
+{
+    (void)slot;
+    const place_job *job = data;
+    const voxel_job *from = job->from;
+    const voxels *v = from->voxels;
+    const double offset = from->corners ? 0.0 : 0.5;
+    const int shift[4] = {0, v->shift_y, v->shift_z, v->bits};
+    for (size_t i = begin; i < end; i++) {
+        int64_t at[3] = {0};
+        for (int c = 0; c < from->dimension; c++) {
+            const int64_t cell =
+                v->low[c] + (int64_t)field(job->list->key[i], shift[c], shift[c + 1]);
+            at[c] = (int64_t)rint(((double)cell + offset) * from->voxel + from->anchor[c]);
+        }
+        ascc_points_set(job->samples, i, at);
+    }
+}
+
+static ascc_status sample(voxel_job *job, const ascc_search_tools *tools, ascc_points *samples)
+{
+    const ascc_arena_mark mark = ascc_arena_mark_of(tools->arena);
+    voxels v;
+    ascc_distinct occupied, corners;
+    job->voxels = &v;
+    ascc_status status = occupied_voxels(job, tools, &occupied);
+    if (status == ASCC_OK && job->corners)
+        status = corners_of(job, tools, &occupied, &corners);
+    if (status != ASCC_OK)
+        return status;
+    place_job to = {job, job->corners ? &corners : &occupied, samples};
+    if (!ascc_points_take(samples, tools->arena, to.list->count))
+        return ascc_fail(tools->message, ASCC_ERROR_MEMORY, "no memory for %zu coarse points",
+                         to.list->count);
+    ascc_workers_run(tools->workers, to.list->count, 1024, place, &to);
+    ascc_arena_return(tools->arena, mark);
     return ASCC_OK;
 }
 
 ascc_status ascc_sample_centers(ascc_points *samples, const ascc_search_tools *tools,
                                 const ascc_points *points, int32_t dimension, double voxel)
 {
-    cells list;
-    if (!cells_take(&list, tools->arena, points->count))
-        return ascc_fail(tools->message, ASCC_ERROR_MEMORY, "no memory for voxels");
-    const double inverse = 1.0 / voxel;
-    for (size_t i = 0; i < points->count; i++) {
-        int64_t at[3] = {0};
-        for (int c = 0; c < dimension; c++)
-            at[c] = (int64_t)floor((double)points->position[c][i] * inverse);
-        cells_add(&list, at);
-    }
-    const ascc_status status = cells_unique(&list, tools);
-    if (status != ASCC_OK)
-        return status;
-    const double origin[3] = {0.0, 0.0, 0.0};
-    return place(samples, tools, &list, dimension, voxel, 0.5, origin);
+    voxel_job job = {.points = points, .dimension = dimension, .voxel = voxel};
+    return sample(&job, tools, samples);
 }
 
 ascc_status ascc_sample_corners(ascc_points *samples, const ascc_search_tools *tools,
                                 const ascc_points *points, int32_t dimension, double voxel,
                                 double hysteresis, const double anchor[3])
 {
-    cells list, nodes;
-    if (!cells_take(&list, tools->arena, points->count * 2))
-        return ascc_fail(tools->message, ASCC_ERROR_MEMORY, "no memory for voxels");
-    for (size_t i = 0; i < points->count; i++) {
-        int64_t lower[3] = {0}, upper[3] = {0};
-        bool differ = false;
-        for (int c = 0; c < dimension; c++) {
-            const double u = ((double)points->position[c][i] - anchor[c]) / voxel;
-            lower[c] = (int64_t)floor(u - hysteresis);
-            upper[c] = (int64_t)floor(u + hysteresis);
-            differ |= lower[c] != upper[c];
-        }
-        cells_add(&list, lower);
-        if (differ)
-            cells_add(&list, upper);
-    }
-    ascc_status status = cells_unique(&list, tools);
-    if (status != ASCC_OK)
-        return status;
-    const int corners = 1 << dimension;
-    if (!cells_take(&nodes, tools->arena, list.count * (size_t)corners))
-        return ascc_fail(tools->message, ASCC_ERROR_MEMORY, "no memory for voxels");
-    for (size_t i = 0; i < list.count; i++)
-        for (int k = 0; k < corners; k++) {
-            const int64_t *cell = list.at + i * 3;
-            const int64_t node[3] = {cell[0] + (k & 1), cell[1] + (k >> 1 & 1),
-                                     cell[2] + (k >> 2 & 1)};
-            cells_add(&nodes, node);
-        }
-    status = cells_unique(&nodes, tools);
-    if (status != ASCC_OK)
-        return status;
-    return place(samples, tools, &nodes, dimension, voxel, 0.0, anchor);
+    voxel_job job = {.points = points,
+                     .dimension = dimension,
+                     .voxel = voxel,
+                     .hysteresis = hysteresis,
+                     .anchor = {anchor[0], anchor[1], anchor[2]},
+                     .corners = true};
+    return sample(&job, tools, samples);
 }
 
 ascc_status ascc_sample_farthest(ascc_points *samples, const ascc_search_tools *tools,
@@ -195,8 +245,9 @@ ascc_status ascc_sample_farthest(ascc_points *samples, const ascc_search_tools *
 {
     const size_t n = points->count;
     count = ascc_min_size(count, n);
-    double *nearest = ascc_arena_take(tools->arena, n, sizeof *nearest);
-    uint8_t *chosen = ascc_arena_take(tools->arena, n, sizeof *chosen);
+    const ascc_arena_mark mark = ascc_arena_mark_of(tools->arena);
+    double *nearest = ascc_arena_lend(tools->arena, n, sizeof *nearest);
+    uint8_t *chosen = ascc_arena_lend(tools->arena, n, sizeof *chosen);
     if (!nearest || !chosen || !ascc_points_take(samples, tools->arena, count))
         return ascc_fail(tools->message, ASCC_ERROR_MEMORY, "no memory for %zu farthest points",
                          count);
@@ -232,5 +283,6 @@ ascc_status ascc_sample_farthest(ascc_points *samples, const ascc_search_tools *
             ascc_points_set(samples, kept++, at);
         }
     samples->count = kept;
+    ascc_arena_return(tools->arena, mark);
     return ASCC_OK;
 }

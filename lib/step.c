@@ -151,9 +151,9 @@ static bool take_features(const ascc_step *step, ascc_arena *arena, const ascc_p
 {
     const ascc_plan *plan = &step->model->plan;
     const size_t d = (size_t)p->dimension;
-    *fluid = ascc_arena_take(arena, p->fluid_count, (size_t)plan->fluid_channels * sizeof(float));
+    *fluid = ascc_arena_lend(arena, p->fluid_count, (size_t)plan->fluid_channels * sizeof(float));
     *boundary =
-        ascc_arena_take(arena, p->boundary_count, (size_t)plan->boundary_channels * sizeof(float));
+        ascc_arena_lend(arena, p->boundary_count, (size_t)plan->boundary_channels * sizeof(float));
     if (!*fluid || !*boundary)
         return false;
     const double motion = step->length_unit * plan->time_step / plan->spacing;
@@ -167,13 +167,27 @@ static bool take_features(const ascc_step *step, ascc_arena *arena, const ascc_p
     return true;
 }
 
-/* Positions in metres. */
-static double *scaled(ascc_arena *arena, const double *position, size_t count, double unit)
+typedef struct scale_job {
+    const double *from;
+    double *to, unit;
+} scale_job;
+
+static void scale_part(void *data, size_t begin, size_t end, int32_t slot)
 {
-    double *to = ascc_arena_take(arena, count, sizeof *to);
-    for (size_t i = 0; to && i < count; i++)
-        to[i] = position[i] * unit;
-    return to;
+    (void)slot;
+    const scale_job *job = data;
+    for (size_t i = begin; i < end; i++)
+        job->to[i] = job->from[i] * job->unit;
+}
+
+/* Positions in metres. */
+static double *scaled(const ascc_search_tools *tools, const double *position, size_t count,
+                      double unit)
+{
+    scale_job job = {position, ascc_arena_lend(tools->arena, count, sizeof(double)), unit};
+    if (job.to)
+        ascc_workers_run(tools->workers, count, 16384, scale_part, &job);
+    return job.to;
 }
 
 /* Quanta per kilogram and unit of the network's output: the output is a displacement during the
@@ -189,15 +203,33 @@ static ascc_impulse_scale impulse_scale(const ascc_step *step, const ascc_partic
     return scale;
 }
 
-static void add_totals(int64_t total[3], const int64_t *rows, size_t count, size_t d)
+/* Sums for the statistics: they wrap instead of failing. */
+typedef struct totals_job {
+    const int64_t *rows;
+    size_t dimension;
+    atomic_uint_least64_t sum[3];
+} totals_job;
+
+static void add_rows(void *data, size_t begin, size_t end, int32_t slot)
 {
-    /* A reading for the statistics: wraps instead of failing. */
+    (void)slot;
+    totals_job *job = data;
+    const size_t d = job->dimension;
     uint64_t sum[3] = {0, 0, 0};
-    for (size_t i = 0; i < count; i++)
+    for (size_t i = begin; i < end; i++)
         for (size_t c = 0; c < d; c++)
-            sum[c] += (uint64_t)rows[i * d + c];
+            sum[c] += (uint64_t)job->rows[i * d + c];
+    for (size_t c = 0; c < d; c++)
+        atomic_fetch_add_explicit(&job->sum[c], sum[c], memory_order_relaxed);
+}
+
+static void add_totals(ascc_workers *workers, int64_t total[3], const int64_t *rows, size_t count,
+                       size_t d)
+{
+    totals_job job = {.rows = rows, .dimension = d};
+    ascc_workers_run(workers, count, 8192, add_rows, &job);
     for (size_t c = 0; c < 3; c++)
-        total[c] = (int64_t)sum[c];
+        total[c] = (int64_t)atomic_load(&job.sum[c]);
 }
 
 static bool take_advance(ascc_advance *advance, ascc_impulses *impulses, ascc_arena *arena,
@@ -231,21 +263,24 @@ static ascc_status run_network(ascc_step *step, const ascc_particles *p, ascc_st
     const size_t d = (size_t)p->dimension;
     float *fluid, *boundary;
     ascc_scene scene = {.fluid_count = p->fluid_count, .boundary_count = p->boundary_count};
-    scene.fluid = scaled(tools->arena, advance->position, p->fluid_count * d, step->length_unit);
-    scene.boundary =
-        scaled(tools->arena, p->wall_position, p->boundary_count * d, step->length_unit);
-    if (!scene.fluid || !scene.boundary ||
-        !take_features(step, tools->arena, p, advance, &fluid, &boundary))
+    const ascc_arena_mark before_features = ascc_arena_mark_of(tools->arena);
+    const bool room = take_features(step, tools->arena, p, advance, &fluid, &boundary);
+    const ascc_arena_mark before_scene = ascc_arena_mark_of(tools->arena);
+    scene.fluid = scaled(tools, advance->position, p->fluid_count * d, step->length_unit);
+    scene.boundary = scaled(tools, p->wall_position, p->boundary_count * d, step->length_unit);
+    if (!room || !scene.fluid || !scene.boundary)
         return ascc_fail(tools->message, ASCC_ERROR_MEMORY, "no memory for the features");
     s->seconds_prepare = lap(since);
 
     ascc_status status = ascc_hierarchy_build(hierarchy, tools, &step->model->plan, &scene);
+    ascc_arena_return(tools->arena, before_scene);
     s->seconds_hierarchy = lap(since);
     if (status == ASCC_OK)
         status = ascc_network_demand(run, &step->network, hierarchy, tools);
     s->seconds_search = lap(since);
     if (status == ASCC_OK)
         status = ascc_network_forward(run, fluid, boundary);
+    ascc_arena_return(tools->arena, before_features);
     s->seconds_network = lap(since);
     if (status != ASCC_OK)
         return status;
@@ -265,20 +300,35 @@ static ascc_status run_network(ascc_step *step, const ascc_particles *p, ascc_st
     return status;
 }
 
+typedef struct commit_job {
+    ascc_particles *particles;
+    const ascc_advance *advance;
+} commit_job;
+
+static void commit_rows(void *data, size_t begin, size_t end, int32_t slot)
+{
+    (void)slot;
+    const commit_job *job = data;
+    const size_t d = (size_t)job->particles->dimension, n = (end - begin) * d;
+    memcpy(job->particles->position + begin * d, job->advance->position + begin * d,
+           n * sizeof(double));
+    memcpy(job->particles->momentum + begin * d, job->advance->momentum + begin * d,
+           n * sizeof(int64_t));
+}
+
 /* The new state becomes the particles' own: nothing here can fail. */
 static void commit(ascc_step *step, ascc_particles *p, const ascc_advance *advance,
                    const ascc_impulses *impulses)
 {
+    ascc_workers *workers = step->context->workers;
     ascc_step_statistics *s = &step->statistics;
     const size_t d = (size_t)p->dimension, n = p->fluid_count;
-    add_totals(s->momentum_before, p->momentum, n, d);
-    add_totals(s->momentum_after, advance->momentum, n, d);
-    add_totals(s->external_impulse, advance->external, n, d);
-    add_totals(s->wall_impulse, impulses->wall, p->boundary_count, d);
-    if (n) {
-        memcpy(p->position, advance->position, n * d * sizeof(double));
-        memcpy(p->momentum, advance->momentum, n * d * sizeof(int64_t));
-    }
+    add_totals(workers, s->momentum_before, p->momentum, n, d);
+    add_totals(workers, s->momentum_after, advance->momentum, n, d);
+    add_totals(workers, s->external_impulse, advance->external, n, d);
+    add_totals(workers, s->wall_impulse, impulses->wall, p->boundary_count, d);
+    commit_job job = {p, advance};
+    ascc_workers_run(workers, n, 8192, commit_rows, &job);
     if (p->boundary_count)
         memcpy(p->wall_impulse, impulses->wall, p->boundary_count * d * sizeof(int64_t));
 }
@@ -296,11 +346,13 @@ ascc_status ascc_step_once(ascc_step *step, ascc_particles *p, const ascc_motion
     if (!take_advance(advance, impulses, arena, p))
         return ascc_fail(&step->message, ASCC_ERROR_MEMORY, "no memory for %zu particles",
                          p->fluid_count);
-    ascc_status status = ascc_integrate_begin(p, motion, advance, &step->message);
+    const ascc_search_tools *tools = &trace->tools;
+    ascc_status status = ascc_integrate_begin(tools->workers, p, motion, advance, &step->message);
     if (status == ASCC_OK && p->fluid_count)
         status = run_network(step, p, trace, &since);
     if (status == ASCC_OK)
-        status = ascc_integrate_end(p, motion, impulses->fluid, advance, &step->message);
+        status =
+            ascc_integrate_end(tools->workers, p, motion, impulses->fluid, advance, &step->message);
     if (status != ASCC_OK)
         return status;
     commit(step, p, advance, impulses);
@@ -329,6 +381,10 @@ static ascc_status read_forces(ascc_step *step, const ascc_particles *p, const a
     }
     if (!f.acceleration || !f.acceleration->data)
         return ASCC_OK;
+    if (!ascc_scalar_known(f.acceleration->scalar) || f.acceleration->reserved != 0)
+        return ascc_fail(&step->message, ASCC_ERROR_ARGUMENT,
+                         "acceleration: scalar %d, reserved %ld: not an array known here",
+                         (int)f.acceleration->scalar, (long)f.acceleration->reserved);
     if (!ascc_grow(&step->context->allocator, (void **)&step->acceleration,
                    &step->acceleration_capacity, p->fluid_count * d, sizeof(double)))
         return ascc_fail(&step->message, ASCC_ERROR_MEMORY, "no memory for the acceleration");

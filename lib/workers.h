@@ -3,6 +3,8 @@
 #ifndef ASCC_WORKERS_H
 #define ASCC_WORKERS_H
 
+#include <stdatomic.h>
+
 #include "memory.h"
 
 typedef struct ascc_workers ascc_workers;
@@ -25,5 +27,15 @@ int32_t ascc_workers_count(const ascc_workers *workers);
  * belongs to one call. */
 void ascc_workers_run(ascc_workers *workers, size_t count, size_t block,
                       ascc_range_function function, void *data);
+
+/* Blocks tell which element failed: *first is 0, or 1 + the smallest index noted, whatever the order. */
+static inline void ascc_note_first(atomic_size_t *first, size_t index)
+{
+    size_t seen = atomic_load_explicit(first, memory_order_relaxed);
+    while ((seen == 0 || seen > index + 1) &&
+           !atomic_compare_exchange_weak_explicit(first, &seen, index + 1, memory_order_relaxed,
+                                                  memory_order_relaxed))
+        ;
+}
 
 #endif

@@ -600,6 +600,8 @@ static void pair_terms_equal_doubles_and_have_the_same_bits_on_every_cpu(void **
                 table[0].pair_terms(&pairs, c.pairs.peak, c.neighbor, k, center, c.feature, a,
                                     c.cells, weight, b, want);
                 check_guard(want, k * 4);
+                for (size_t i = 0; i < k * 4; i++)
+                    assert_true(i % 4 < b || want[i] == 0.0f);
                 for (size_t i = 0; i < k; i++)
                     for (size_t o = 0; o < b; o++) {
                         const float at[3] = {c.pairs.x[i], c.pairs.y[i], c.pairs.z[i]};
@@ -627,6 +629,100 @@ static void pair_terms_equal_doubles_and_have_the_same_bits_on_every_cpu(void **
             }
 }
 
+/* Pairs of one row: terms, masses, neighbours (some twice) and sums so far. */
+#define MOST_PAIRS 21
+#define SUM_ROWS 6
+
+typedef struct impulse_case {
+    float term[MOST_PAIRS * 4];
+    double mass[MOST_PAIRS], factor[4];
+    uint32_t neighbor[MOST_PAIRS];
+    int64_t own[4], sum[SUM_ROWS * 4];
+} impulse_case;
+
+static void random_impulses(impulse_case *c)
+{
+    for (size_t i = 0; i < MOST_PAIRS * 4; i++)
+        c->term[i] = i % 4 < 3 ? uniform() : 0.0f;
+    for (size_t i = 0; i < MOST_PAIRS; i++) {
+        c->mass[i] = 1.5 + (double)uniform();
+        c->neighbor[i] = next() % SUM_ROWS;
+    }
+    for (size_t i = 0; i < 4; i++) {
+        c->factor[i] = i < 3 ? 1e9 * (double)uniform() : 0.0;
+        c->own[i] = (int64_t)next() - 1000;
+    }
+    for (size_t i = 0; i < SUM_ROWS * 4; i++)
+        c->sum[i] = (int64_t)next() << 20;
+    c->term[0] = 0.5f; /* ties: half a quantum to 0, one and a half to 2 */
+    c->term[4] = 1.5f;
+    c->factor[0] = c->mass[0] = c->mass[1] = 1.0;
+}
+
+static int impulses(const ascc_kernels *table, impulse_case *c, size_t step, size_t k)
+{
+    return table->pair_impulses(c->term, c->factor, c->mass, step, 0x1p50, c->neighbor, k, c->own,
+                                c->sum);
+}
+
+static void pair_impulses_are_the_nearest_integers_on_every_cpu(void **state)
+{
+    (void)state;
+    ascc_kernels table[16];
+    const int count = tables(table);
+    for (size_t k = 0; k <= MOST_PAIRS; k++)
+        for (size_t step = 0; step < 2; step++) {
+            impulse_case c;
+            random_impulses(&c);
+            impulse_case want = c;
+            for (size_t j = 0; j < k; j++)
+                for (size_t i = 0; i < 4; i++) {
+                    const double x = (double)c.term[j * 4 + i] * c.factor[i] * c.mass[step ? j : 0];
+                    want.own[i] += (int64_t)rint(x);
+                    want.sum[c.neighbor[j] * 4 + i] -= (int64_t)rint(x);
+                }
+            for (int t = 0; t < count; t++) {
+                impulse_case got = c;
+                assert_int_equal(impulses(&table[t], &got, step, k), 1);
+                assert_true(memcmp(got.own, want.own, sizeof want.own) == 0);
+                assert_true(memcmp(got.sum, want.sum, sizeof want.sum) == 0);
+            }
+        }
+}
+
+static void an_impulse_that_does_not_fit_is_told_on_every_cpu(void **state)
+{
+    (void)state;
+    ascc_kernels table[16];
+    const int count = tables(table);
+    for (size_t k = 1; k <= MOST_PAIRS; k++)
+        for (int fault = 0; fault < 6; fault++)
+            for (int t = 0; t < count; t++) {
+                impulse_case c;
+                random_impulses(&c);
+                const size_t last = k - 1;
+                c.mass[0] = 1.0;
+                c.factor[1] = fault < 3 ? 0x1p50 : 1e3;
+                for (size_t j = 0; j < k; j++)
+                    c.term[j * 4 + 1] = fault < 3 ? 0.0f : 1.0f;
+                if (fault == 0)
+                    c.term[last * 4 + 1] = NAN;
+                else if (fault == 1)
+                    c.term[last * 4 + 1] = -INFINITY;
+                else if (fault == 2)
+                    c.term[last * 4 + 1] = 1.0f;
+                else if (fault == 3)
+                    c.own[1] = INT64_MAX - 1000 * (int64_t)k + 1;
+                else if (fault == 4)
+                    c.sum[c.neighbor[last] * 4 + 1] = INT64_MIN + 999;
+                else {
+                    c.own[1] = INT64_MIN + 1000 * (int64_t)k - 1;
+                    c.factor[1] = -1e3;
+                }
+                assert_int_equal(impulses(&table[t], &c, 0, k), 0);
+            }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -642,6 +738,8 @@ int main(void)
         cmocka_unit_test(gather_equals_doubles_and_has_the_same_bits_on_every_cpu),
         cmocka_unit_test(multiply_equals_doubles_and_has_the_same_bits_on_every_cpu),
         cmocka_unit_test(pair_terms_equal_doubles_and_have_the_same_bits_on_every_cpu),
+        cmocka_unit_test(pair_impulses_are_the_nearest_integers_on_every_cpu),
+        cmocka_unit_test(an_impulse_that_does_not_fit_is_told_on_every_cpu),
     };
     return cmocka_run_group_tests_name("kernels", tests, NULL, NULL);
 }

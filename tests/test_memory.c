@@ -192,6 +192,76 @@ static void an_arena_refuses_sizes_that_do_not_fit(void **state)
     assert_true(test_memory_is_clean(&memory));
 }
 
+static void what_is_lent_is_lent_again_after_its_return(void **state)
+{
+    (void)state;
+    test_memory memory = {0};
+    const ascc_allocator allocator = test_memory_allocator(&memory);
+    ascc_arena arena;
+    ascc_arena_open(&arena, &allocator);
+    for (int turn = 0; turn < 3; turn++) {
+        unsigned char *const kept = ascc_arena_take(&arena, 100, 1);
+        memset(kept, 1, 100);
+        for (int k = 0; k < 50; k++) {
+            const ascc_arena_mark mark = ascc_arena_mark_of(&arena);
+            unsigned char *const first = ascc_arena_lend(&arena, 1000, 1);
+            unsigned char *const between = ascc_arena_take(&arena, 10, 1);
+            unsigned char *const second = ascc_arena_lend(&arena, 77, 3);
+            assert_true(is_aligned(first) && is_aligned(between) && is_aligned(second));
+            memset(first, 2, 1000);
+            memset(between, 3, 10);
+            memset(second, 4, 77 * 3);
+            assert_int_equal(first[999], 2);
+            assert_int_equal(between[9], 3);
+            ascc_arena_return(&arena, mark);
+        }
+        assert_int_equal(kept[99], 1);
+        /* 100 in 128, 50 times 10 in 64, and once 1000 in 1024 and 231 in 256; after the first turn
+         * one block of an eighth more */
+        assert_int_equal(arena.needed, 128 + 50 * 64 + 1024 + 256);
+        ascc_arena_reset(&arena);
+        assert_int_equal(memory.bytes, 4608 + 4608 / 8);
+        assert_int_equal(ascc_arena_size(&arena), memory.bytes);
+    }
+    ascc_arena_close(&arena);
+    assert_true(test_memory_is_clean(&memory));
+}
+
+static void a_piece_that_grows_keeps_its_contents_and_gives_back_the_rest(void **state)
+{
+    (void)state;
+    test_memory memory = {0};
+    const ascc_allocator allocator = test_memory_allocator(&memory);
+    ascc_arena arena;
+    ascc_arena_open(&arena, &allocator);
+    for (int turn = 0; turn < 3; turn++) {
+        uint32_t *const other = ascc_arena_take(&arena, 64, 4);
+        uint32_t *piece = NULL;
+        size_t count = 0;
+        for (size_t grown = 64; grown <= 64 * 8; grown *= 2) {
+            piece = ascc_arena_grow(&arena, piece, count, grown, 4);
+            assert_non_null(piece);
+            for (size_t i = 0; i < count; i++)
+                assert_int_equal(piece[i], i);
+            for (size_t i = 0; i < grown; i++)
+                piece[i] = (uint32_t)i;
+            count = grown;
+        }
+        assert_int_equal(arena.taken, 64 * 4 + 64 * 8 * 4);
+        memory.fail_at = memory.calls + 1;
+        assert_null(ascc_arena_grow(&arena, piece, count, count * 100, 4));
+        memory.fail_at = 0;
+        assert_int_equal(arena.taken, 64 * 4 + 64 * 8 * 4);
+        assert_int_equal(piece[count - 1], count - 1);
+        assert_null(ascc_arena_grow(&arena, piece, count, SIZE_MAX, 4));
+        (void)other;
+        ascc_arena_reset(&arena);
+        assert_int_equal(memory.bytes, 2304 + 2304 / 8);
+    }
+    ascc_arena_close(&arena);
+    assert_true(test_memory_is_clean(&memory));
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -204,6 +274,8 @@ int main(void)
         cmocka_unit_test(arena_pieces_do_not_overlap),
         cmocka_unit_test(a_steady_arena_allocates_nothing),
         cmocka_unit_test(an_arena_lives_on_without_memory),
+        cmocka_unit_test(what_is_lent_is_lent_again_after_its_return),
+        cmocka_unit_test(a_piece_that_grows_keeps_its_contents_and_gives_back_the_rest),
         cmocka_unit_test(an_arena_refuses_sizes_that_do_not_fit),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -619,6 +619,13 @@ static void bad_forces_are_refused(void **state)
     const ascc_const_array acceleration = {.data = push};
     forces = (ascc_forces){.size = sizeof forces, .acceleration = &acceleration};
     check_refused(&w, &forces, ASCC_ERROR_NOT_FINITE, "acceleration");
+    push[100] = 0.0f;
+    const ascc_const_array unknown = {.data = push, .scalar = (ascc_scalar)2},
+                           later = {.data = push, .reserved = 1};
+    forces = (ascc_forces){.size = sizeof forces, .acceleration = &unknown};
+    check_refused(&w, &forces, ASCC_ERROR_ARGUMENT, "acceleration: scalar 2");
+    forces.acceleration = &later;
+    check_refused(&w, &forces, ASCC_ERROR_ARGUMENT, "reserved 1");
     const double huge[3] = {1e300, 0.0, 0.0};
     forces = (ascc_forces){.size = sizeof forces, .gravity = huge};
     check_refused(&w, &forces, ASCC_ERROR_RANGE, "momentum");
@@ -876,6 +883,24 @@ static void set_block(world *w, int side)
     free(x);
 }
 
+static void the_first_bad_row_is_named_for_any_number_of_threads(void **state)
+{
+    (void)state;
+    for (int32_t threads = 1; threads <= 4; threads++) {
+        const world_options o = {.dimension = 3, .threads = threads};
+        world w = open_world(&o);
+        set_block(&w, 16);
+        double *push = calloc((size_t)16 * 16 * 16 * 3, sizeof *push);
+        assert_non_null(push);
+        push[3900 * 3] = push[1500 * 3 + 1] = push[1501 * 3] = push[2100 * 3 + 2] = 1e300;
+        const ascc_const_array acceleration = {.data = push, .scalar = ASCC_DOUBLE};
+        const ascc_forces forces = {.size = sizeof forces, .acceleration = &acceleration};
+        check_refused(&w, &forces, ASCC_ERROR_RANGE, "(row 1500)");
+        free(push);
+        close_world(&w);
+    }
+}
+
 static void the_estimate_of_scratch_is_within_a_factor_of_two(void **state)
 {
     (void)state;
@@ -994,6 +1019,7 @@ int main(void)
         cmocka_unit_test(values_too_large_for_an_impulse_are_an_error),
         cmocka_unit_test(a_steady_step_allocates_nothing),
         cmocka_unit_test(each_failing_allocation_leaves_the_particles_as_they_were),
+        cmocka_unit_test(the_first_bad_row_is_named_for_any_number_of_threads),
         cmocka_unit_test(the_estimate_of_scratch_is_within_a_factor_of_two),
         cmocka_unit_test(a_reserved_step_grows_once),
         cmocka_unit_test(statistics_tell_what_happened),

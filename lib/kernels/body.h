@@ -486,6 +486,49 @@ static void multiply(const float *in, size_t in_stride, size_t n, size_t a, cons
     }
 }
 
+/* out[outputs] of one pair: a kernel between `count` corners, times both sides' features. */
+#define PAIR(name, outputs, count)                                                                 \
+    static inline void name(const float *RESTRICT share, const size_t *RESTRICT offset,            \
+                            const float *RESTRICT center, const float *RESTRICT f, size_t a,       \
+                            const float *RESTRICT weight, float *RESTRICT out)                     \
+    {                                                                                              \
+        vector s[count], sum[outputs];                                                             \
+        for (size_t c = 0; c < count; c++)                                                         \
+            s[c] = fill(share[c * LANES]);                                                         \
+        for (size_t o = 0; o < outputs; o++)                                                       \
+            sum[o] = fill(0.0f);                                                                   \
+        for (size_t j = 0; j < a; j += LANES) {                                                    \
+            const vector both = add(load(center + j), load(f + j));                                \
+            for (size_t o = 0; o < outputs; o++) {                                                 \
+                const float *w = weight + o * a + j;                                               \
+                vector g = times(s[0], load(w));                                                   \
+                for (size_t c = 1; c < count; c++)                                                 \
+                    g = fused(s[c], load(w + offset[c]), g);                                       \
+                sum[o] = fused(both, g, sum[o]);                                                   \
+            }                                                                                      \
+        }                                                                                          \
+        store_totals(out, sum[0], sum[1], outputs > 2 ? sum[outputs - 1] : fill(0.0f));            \
+    }
+PAIR(pair_3_8, 3, 8)
+PAIR(pair_2_4, 2, 4)
+
+/* The same for flat kernels in space and others that are seldom. */
+static void pair_any(const float *share, const size_t *offset, int count, const float *center,
+                     const float *f, size_t a, const float *weight, size_t outputs, float *out)
+{
+    for (size_t o = 0; o < 4; o++) {
+        vector sum = fill(0.0f);
+        for (size_t j = 0; o < outputs && j < a; j += LANES) {
+            const float *w = weight + o * a + j;
+            vector g = times(fill(share[0]), load(w));
+            for (int c = 1; c < count; c++)
+                g = fused(fill(share[c * LANES]), load(w + offset[c]), g);
+            sum = fused(add(load(center + j), load(f + j)), g, sum);
+        }
+        out[o] = total(sum);
+    }
+}
+
 static void pair_terms(const ascc_pairs *pairs, const float *window, const uint32_t *neighbor,
                        size_t k, const float *center, const float *feature, size_t a,
                        const int32_t cells[3], const float *weight, size_t b, float *out)
@@ -500,25 +543,82 @@ static void pair_terms(const ascc_pairs *pairs, const float *window, const uint3
         find_corners(pairs->x + i, pairs->y + i, pairs->z + i, window ? window + i : NULL, cells,
                      &at);
         for (size_t l = 0; l < n; l++) {
-            const float *f = feature + (size_t)neighbor[i + l] * a;
+            const float *f = feature + (size_t)neighbor[i + l] * a, *share = at.weight[0] + l;
             const float *base = weight + (size_t)at.cell[l] * a * b;
-            vector share[8];
-            for (int c = 0; c < count; c++)
-                share[c] = fill(at.weight[c][l]);
-            for (size_t o = 0; o < b; o++) {
-                vector sum = fill(0.0f);
-                for (size_t j = 0; j < a; j += LANES) {
-                    const float *w = base + o * a + j;
-                    vector g = times(share[0], load(w));
-                    for (int c = 1; c < count; c++)
-                        g = fused(share[c], load(w + offset[c]), g);
-                    sum = fused(add(load(center + j), load(f + j)), g, sum);
-                }
-                out[(i + l) * 4 + o] = total(sum);
-            }
+            float *to = out + (i + l) * 4;
+            if (b == 3 && count == 8)
+                pair_3_8(share, offset, center, f, a, base, to);
+            else if (b == 2 && count == 4)
+                pair_2_4(share, offset, center, f, a, base, to);
+            else
+                pair_any(share, offset, count, center, f, a, base, b, to);
         }
     }
 }
+
+/* Rounds |x| < 2^51 to the nearest integer, ties to even, in any build: the low bits of x + this. */
+#define ROUND_MAGIC 6755399441055744.0
+
+#if defined(ASCC_USE_AVX2)
+/* The loop below on four doubles, same operations in the same order. */
+static int pair_impulses(const float *term, const double factor[4], const double *mass,
+                         size_t mass_step, double limit, const uint32_t *neighbor, size_t k,
+                         int64_t own[4], int64_t *sum)
+{
+    const __m256d magic = _mm256_set1_pd(ROUND_MAGIC), limits = _mm256_set1_pd(limit);
+    const __m256d sign = _mm256_set1_pd(-0.0), factors = _mm256_loadu_pd(factor);
+    const __m256i zero = _mm256_castpd_si256(magic);
+    __m256i ours = _mm256_loadu_si256((const __m256i *)own), wrong = _mm256_setzero_si256();
+    __m256d good = _mm256_castsi256_pd(_mm256_set1_epi64x(-1));
+    for (size_t j = 0; j < k; j++, mass += mass_step) {
+        __m256i *to = (__m256i *)(sum + (size_t)neighbor[j] * 4);
+        const __m256d terms = _mm256_cvtps_pd(_mm_loadu_ps(term + j * 4));
+        const __m256d x = _mm256_mul_pd(_mm256_mul_pd(terms, factors), _mm256_broadcast_sd(mass));
+        const __m256i quanta = _mm256_sub_epi64(_mm256_castpd_si256(_mm256_add_pd(x, magic)), zero);
+        const __m256i before = _mm256_loadu_si256(to), after = _mm256_sub_epi64(before, quanta);
+        const __m256i sums = _mm256_add_epi64(ours, quanta);
+        wrong = _mm256_or_si256(wrong, _mm256_and_si256(_mm256_xor_si256(before, quanta),
+                                                        _mm256_xor_si256(before, after)));
+        wrong = _mm256_or_si256(
+            wrong, _mm256_and_si256(_mm256_xor_si256(ours, sums), _mm256_xor_si256(quanta, sums)));
+        good = _mm256_and_pd(good, _mm256_cmp_pd(_mm256_andnot_pd(sign, x), limits, _CMP_LT_OQ));
+        _mm256_storeu_si256(to, after);
+        ours = sums;
+    }
+    _mm256_storeu_si256((__m256i *)own, ours);
+    return _mm256_movemask_pd(_mm256_castsi256_pd(wrong)) == 0 && _mm256_movemask_pd(good) == 15;
+}
+#else
+static int pair_impulses(const float *term, const double factor[4], const double *mass,
+                         size_t mass_step, double limit, const uint32_t *neighbor, size_t k,
+                         int64_t own[4], int64_t *sum)
+{
+    const double magic = ROUND_MAGIC;
+    uint64_t zero, wrong = 0, given[4];
+    int good = 1;
+    memcpy(&zero, &magic, sizeof zero);
+    memcpy(given, own, sizeof given);
+    for (size_t j = 0; j < k; j++, mass += mass_step) {
+        int64_t *to = sum + (size_t)neighbor[j] * 4;
+        for (size_t c = 0; c < 4; c++) {
+            const double x = (double)term[j * 4 + c] * factor[c] * *mass;
+            const double shifted = x + magic;
+            uint64_t quanta, before;
+            memcpy(&quanta, &shifted, sizeof quanta);
+            quanta -= zero;
+            memcpy(&before, to + c, sizeof before);
+            const uint64_t after = before - quanta, ours = given[c] + quanta;
+            wrong |= (before ^ quanta) & (before ^ after);
+            wrong |= (given[c] ^ ours) & (quanta ^ ours);
+            memcpy(to + c, &after, sizeof after);
+            given[c] = ours;
+            good &= fabs(x) < limit;
+        }
+    }
+    memcpy(own, given, sizeof given);
+    return good && !(wrong >> 63);
+}
+#endif
 
 void ASCC_VARIANT(ascc_kernels *kernels)
 {
@@ -531,4 +631,5 @@ void ASCC_VARIANT(ascc_kernels *kernels)
     kernels->pair_strengths = pair_strengths;
     kernels->multiply = multiply;
     kernels->pair_terms = pair_terms;
+    kernels->pair_impulses = pair_impulses;
 }

@@ -73,10 +73,18 @@ typedef struct ascc_kernels {
 
     /* out[j][b] = window * sum over a of (center[a] + feature[neighbor[j]][a]) * kernel(j)[b][a],
      * kernel(j) = sum over c of trilinear weight * weight[c][b][a], for each pair j < k on its own.
-     * 8 partial sums by a mod 8; b <= 3 is not filled up here, out is [k][4]. */
+     * 8 partial sums by a mod 8; b <= 3 is not filled up here; out is [k][4], the rest zeros. */
     void (*pair_terms)(const ascc_pairs *pairs, const float *window, const uint32_t *neighbor,
                        size_t k, const float *center, const float *feature, size_t a,
                        const int32_t cells[3], const float *weight, size_t b, float *out);
+
+    /* own[4] += q(j), sum[neighbor[j]][4] -= q(j) for each pair j < k, no neighbour being the row
+     * itself: q(j)[c] is the integer nearest to term[j][c] * factor[c] * mass[j * mass_step], ties to
+     * even. 0 if a product is not below limit <= 2^50 or a sum does not fit (then it has wrapped),
+     * else 1. */
+    int (*pair_impulses)(const float *term, const double factor[4], const double *mass,
+                         size_t mass_step, double limit, const uint32_t *neighbor, size_t k,
+                         int64_t own[4], int64_t *sum);
 } ascc_kernels;
 
 /* Fills the table with the best variants among the bits of cpu (ASCC_CPU_*). */

@@ -263,12 +263,38 @@ static inline size_t store_positive(uint32_t *p, uint32_t first, vector a)
 }
 #endif
 
-/* The sum of the lanes, always in this order. */
+/* The sum of the lanes, always in this order: ((0 + 4) + (2 + 6)) + ((1 + 5) + (3 + 7)). */
 static inline float total(vector a)
 {
+#if defined(ASCC_USE_AVX2)
+    const __m128 four = _mm_add_ps(_mm256_castps256_ps128(a), _mm256_extractf128_ps(a, 1));
+    const __m128 two = _mm_add_ps(four, _mm_movehl_ps(four, four));
+    return _mm_cvtss_f32(_mm_add_ss(two, _mm_shuffle_ps(two, two, 1)));
+#else
     float l[LANES];
     store(l, a);
     return ((l[0] + l[4]) + (l[2] + l[6])) + ((l[1] + l[5]) + (l[3] + l[7]));
+#endif
+}
+
+/* p[4] = the sums of the lanes of three, and 0. */
+static inline void store_totals(float *p, vector a, vector b, vector c)
+{
+#if defined(ASCC_USE_AVX2)
+    const __m128 x = _mm_add_ps(_mm256_castps256_ps128(a), _mm256_extractf128_ps(a, 1));
+    const __m128 y = _mm_add_ps(_mm256_castps256_ps128(b), _mm256_extractf128_ps(b, 1));
+    const __m128 z = _mm_add_ps(_mm256_castps256_ps128(c), _mm256_extractf128_ps(c, 1));
+    const __m128 zero = _mm_setzero_ps();
+    const __m128 xy = _mm_add_ps(_mm_movelh_ps(x, y), _mm_movehl_ps(y, x));
+    const __m128 z0 = _mm_add_ps(_mm_movelh_ps(z, zero), _mm_movehl_ps(zero, z));
+    _mm_storeu_ps(p, _mm_add_ps(_mm_shuffle_ps(xy, z0, _MM_SHUFFLE(2, 0, 2, 0)),
+                                _mm_shuffle_ps(xy, z0, _MM_SHUFFLE(3, 1, 3, 1))));
+#else
+    p[0] = total(a);
+    p[1] = total(b);
+    p[2] = total(c);
+    p[3] = 0.0f;
+#endif
 }
 
 #endif
