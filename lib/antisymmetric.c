@@ -63,20 +63,20 @@ static void note_bad_row(pair_job *job, size_t row)
         ;
 }
 
-/* Displacements from row i to the batch's neighbours in units (or in the host's, at their places before
- * the step), and their squares. */
-static void displacements(const pair_job *job, size_t i, const batch *b, double d[3][BATCH],
-                          double square[BATCH])
+/* Displacements from row i to the batch's neighbours and their squares: at their places, in the host's
+ * unit, or as the network sees them, in units (place NULL). */
+static void displacements(const ascc_rows *rows, const double *place, size_t i, const batch *b,
+                          double d[3][BATCH], double square[BATCH])
 {
     for (size_t k = 0; k < b->count; k++)
         square[k] = 0.0;
     for (size_t c = 0; c < 3; c++) {
-        const int32_t *source = job->rows->source->low[c];
-        const uint32_t here = (uint32_t)job->rows->query->low[c][i];
+        const int32_t *source = rows->source->low[c];
+        const uint32_t here = (uint32_t)rows->query->low[c][i];
         for (size_t k = 0; k < b->count; k++) {
             const size_t j = b->neighbor[k];
-            d[c][k] = job->place ? job->place[j * 3 + c] - job->place[i * 3 + c]
-                                 : (double)(int32_t)((uint32_t)source[j] - here);
+            d[c][k] = place ? place[j * 3 + c] - place[i * 3 + c]
+                            : (double)(int32_t)((uint32_t)source[j] - here);
             square[k] += d[c][k] * d[c][k];
         }
     }
@@ -86,7 +86,7 @@ static void displacements(const pair_job *job, size_t i, const batch *b, double 
 static void make_central(const pair_job *job, size_t i, const batch *b, double t[3][BATCH])
 {
     double d[3][BATCH], square[BATCH];
-    displacements(job, i, b, d, square);
+    displacements(job->rows, NULL, i, b, d, square);
     for (size_t k = 0; k < b->count; k++) {
         const double along = d[0][k] * t[0][k] + d[1][k] * t[1][k] + d[2][k] * t[2][k];
         const double share = along / square[k];
@@ -102,8 +102,23 @@ static const float *motion_of(const ascc_network_run *run, size_t row)
     return run->value[0].raw + row * ascc_padded(plan->fluid_channels) + ascc_plan_motion(plan, 0);
 }
 
+/* Strengths times the cosine between the line before the step, d of these squares, and the line that the
+ * network sees. */
+static void turn_strengths(const pair_job *job, size_t i, batch *b, double d[3][BATCH],
+                           const double square[BATCH])
+{
+    double seen[3][BATCH], seen_square[BATCH];
+    displacements(job->rows, NULL, i, b, seen, seen_square);
+    for (size_t k = 0; k < b->count; k++) {
+        const double lengths = sqrt(seen_square[k] * square[k]);
+        const double along =
+            d[0][k] * seen[0][k] + d[1][k] * seen[1][k] + d[2][k] * seen[2][k];
+        b->strength[k] *= lengths > 0.0 ? (float)(along / lengths) : 0.0f;
+    }
+}
+
 /* Strengths along the lines d, of these squares, become vectors, damping included. Particles at one
- * place have no line. `other` gives a neighbour's motion, NULL that of walls. */
+ * place have no line. Walls do not move. */
 static void point_strengths(const pair_job *job, size_t i, const batch *b, bool damped, bool fluid,
                             const double square[BATCH], double t[3][BATCH])
 {
@@ -127,13 +142,15 @@ static void point_strengths(const pair_job *job, size_t i, const batch *b, bool 
 }
 
 /* Impulses on row i from the neighbours of the batch in quanta, before rounding. */
-static void impulses_of(const pair_job *job, size_t i, const batch *b, double t[3][BATCH])
+static void impulses_of(const pair_job *job, size_t i, batch *b, double t[3][BATCH])
 {
     const ascc_plan *plan = job->run->network->plan;
     const double *factor = job->scale->factor;
     if (job->share[0]) {
         double square[BATCH];
-        displacements(job, i, b, t, square);
+        displacements(job->rows, job->place, i, b, t, square);
+        if (job->place)
+            turn_strengths(job, i, b, t, square);
         point_strengths(job, i, b, job->share[ASCC_PART_DAMPING] != NULL, true, square, t);
     } else {
         for (int c = 0; c < 3; c++)
@@ -332,7 +349,7 @@ static void flush_walls(pair_job *job, size_t i, const size_t *wall, batch *b)
     const ascc_network_run *run = job->run;
     const ascc_plan *plan = run->network->plan;
     const size_t d = (size_t)plan->dimension;
-    double t[3][BATCH] = {{0.0}}, square[BATCH];
+    double t[3][BATCH], square[BATCH];
     int64_t quanta[BATCH];
     const ascc_geometry g = ascc_network_geometry(run, job->rows, &plan->output.walls.filter, i,
                                                   b->neighbor, b->count, b->geometry, BATCH);
@@ -342,17 +359,7 @@ static void flush_walls(pair_job *job, size_t i, const size_t *wall, batch *b)
                 g.pairs.distance, nobody, b->count, job->share[part] + i * ASCC_MAX_BUMPS, nothing,
                 (size_t)plan->output.walls.filter.bumps,
                 part == ASCC_PART_WALL ? b->strength : b->damping);
-    for (size_t k = 0; k < b->count; k++) {
-        square[k] = 0.0;
-        for (size_t c = 0; c < d; c++) {
-            const size_t j = b->neighbor[k];
-            t[c][k] = job->place
-                          ? job->scale->wall_position[wall[k] * d + c] - job->place[i * 3 + c]
-                          : (double)(int32_t)((uint32_t)job->rows->source->low[c][j] -
-                                              (uint32_t)job->rows->query->low[c][i]);
-            square[k] += t[c][k] * t[c][k];
-        }
-    }
+    displacements(job->rows, NULL, i, b, t, square);
     point_strengths(job, i, b, job->share[ASCC_PART_WALL_DAMPING] != NULL, false, square, t);
     bool good = true;
     for (size_t c = 0; c < d; c++) {

@@ -23,7 +23,7 @@ typedef struct ascc_impulses {
 typedef struct ascc_impulse_scale {
     const double *mass; /* of fluid rows, kg */
     double factor[3];   /* quanta per kg and unit of output */
-    const double *position, *wall_position; /* [host's rows][dimension], before the step */
+    const double *position; /* of fluid rows, before the step */
 } ascc_impulse_scale;
 
 /* The greatest impulse of one pair, quanta. */

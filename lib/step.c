@@ -196,7 +196,7 @@ static ascc_impulse_scale impulse_scale(const ascc_step *step, const ascc_partic
 {
     const ascc_plan *plan = &step->model->plan;
     ascc_impulse_scale scale = {
-        .mass = p->mass, .position = p->position, .wall_position = p->wall_position};
+        .mass = p->mass, .position = p->position};
     for (int c = 0; c < 3; c++)
         scale.factor[c] = plan->output.scale[c] / plan->time_step *
                           (step->time_step / plan->time_step) / step->length_unit / p->quantum;

@@ -23,7 +23,6 @@ static const double PI = 3.14159265358979323846;
 static const double FILL = 0.7; /* of the neighbours inside a lattice: fluids have surfaces */
 static const double COARSE_RADIUS = 2.25; /* voxels */
 static const double SCALE = 0.05;         /* of the output, spacings */
-enum { OUTPUT_BUMPS = 4 };
 
 ascc_architecture ascc_architecture_default(int32_t dimension, ascc_architecture_family kernel)
 {
@@ -41,6 +40,7 @@ ascc_architecture ascc_architecture_default(int32_t dimension, ascc_architecture
                                .bumps = 3,
                                .order = 1,
                                .wall_bumps = 4,
+                               .output_bumps = 4,
                                .output = ASCC_OUTPUT_ANTISYMMETRIC,
                                .radial = !basis,
                                .damping = basis,
@@ -559,12 +559,13 @@ static void central_output(writer *w, const char *last)
     add(&w->network,
         "]}],\"output\":{\"type\":\"antisymmetric\",\"source\":\"%s\",\"relu\":true,\"scale\":%.9g,"
         "\"radius\":%.9g,\"basis\":{\"bumps\":%d},",
-        last, SCALE * a->spacing, a->radius * a->spacing, OUTPUT_BUMPS);
-    output_kernels(w, "output", OUTPUT_BUMPS);
+        last, SCALE * a->spacing,
+        (a->output_radius > 0.0 ? a->output_radius : a->radius) * a->spacing, a->output_bumps);
+    output_kernels(w, "output", a->output_bumps);
     add(&w->network, ",\"walls\":{\"radius\":%.9g,\"basis\":{\"bumps\":%d},",
         a->wall_radius * a->spacing, a->wall_bumps);
     output_kernels(w, "output.walls", a->wall_bumps);
-    add(&w->network, "}%s}", a->advected ? ",\"direction\":\"current\"" : "");
+    add(&w->network, "}%s}", a->advected && !a->seen_direction ? ",\"direction\":\"current\"" : "");
 }
 
 static void basis_network(writer *w)

@@ -45,6 +45,9 @@ typedef struct ascc_architecture {
     int32_t coarse_channels[ASCC_ARCHITECTURE_LEVELS];
     int32_t coarse_layers;      /* of each level on the way down */
     double radius, wall_radius; /* spacings; wall_radius: of BASIS only */
+    double output_radius;       /* of BASIS, spacings; 0 = radius */
+    int32_t output_bumps;       /* of BASIS */
+    bool seen_direction;        /* of BASIS: pairs act along the line that the network sees */
     int32_t bumps, order, wall_bumps;
     ascc_output_kind output;
     bool radial;            /* projection, of GRID only */

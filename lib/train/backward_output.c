@@ -109,71 +109,105 @@ static void add_share(const pairs_pass *q, int part, size_t i, const bumps_at *a
         q->share_gradient[part][i * ASCC_MAX_BUMPS + at->first + k] += (float)(at->value[k] * g);
 }
 
+/* One pair and what its impulse along u is made of: cosine * strength - damping * approach. */
+typedef struct pair {
+    size_t i, j;
+    bool both;              /* j is fluid, too */
+    double distance, length; /* of r, seen, and of d, along which the pair acts */
+    double seen[3], u[3];   /* unit vectors of r and d */
+    double cosine, strength, damping, approach;
+    double slope, damping_slope; /* of strength and damping by distance over radius */
+    double force[3], relative[3]; /* gradient of the impulse; motion of i less that of j */
+    double along;                /* force . u */
+} pair;
+
+/* Gradients by r (seen) and d (the line), added to the positions'. */
+static void pass_places(const pairs_pass *q, const pair *a, const ascc_filter *filter)
+{
+    const ascc_passing *p = q->p;
+    const ascc_hierarchy *h = p->run->hierarchy;
+    const size_t n = (size_t)p->run->network->plan->dimension;
+    const bool before = q->place && a->both; /* walls push along the line that the network sees */
+    const double by_cosine = a->along * a->strength;
+    const double by_rho =
+        a->along * (a->cosine * a->slope - a->damping_slope * a->approach) / filter->radius;
+    double by_u[3], by_seen[3], seen_i[3], seen_j[3], turned = 0.0, seen_turned = 0.0;
+    for (size_t c = 0; c < 3; c++) {
+        by_u[c] = a->force[c] * (a->cosine * a->strength - a->damping * a->approach) -
+                  a->damping * a->along * a->relative[c] + (before ? by_cosine * a->seen[c] : 0.0);
+        by_seen[c] = before ? by_cosine * a->u[c] : 0.0;
+        turned += by_u[c] * a->u[c];
+        seen_turned += by_seen[c] * a->seen[c];
+    }
+    for (size_t c = 0; c < 3; c++) {
+        const double by_d = (by_u[c] - turned * a->u[c]) / a->length;
+        seen_j[c] = by_rho * a->seen[c] + (before ? 0.0 : by_d);
+        if (a->distance > 0.0)
+            seen_j[c] += (by_seen[c] - seen_turned * a->seen[c]) / a->distance;
+        seen_i[c] = -seen_j[c];
+        if (before && c < n) {
+            p->pass->place[host_row(h, q->set, a->i) * n + c] -= by_d;
+            p->pass->place[host_row(h, q->set, a->j) * n + c] += by_d;
+        }
+    }
+    ascc_backward_place(p, q->set, a->i, seen_i);
+    if (a->both)
+        ascc_backward_place(p, q->set, a->j, seen_j);
+}
+
+static void find_pair(const pairs_pass *q, int part, const bumps_at *at, const double r[3],
+                      const double d[3], pair *a)
+{
+    const ascc_passing *p = q->p;
+    const ascc_plan *plan = p->run->network->plan;
+    for (size_t c = 0; c < 3; c++) {
+        a->u[c] = d[c] / a->length;
+        a->seen[c] = a->distance > 0.0 ? r[c] / a->distance : 0.0;
+        a->force[c] = q->g[a->i * 3 + c] - (a->both ? q->g[a->j * 3 + c] : 0.0);
+        a->relative[c] = 0.0;
+    }
+    a->cosine = q->place && a->both ? dot3(a->seen, a->u) : 1.0;
+    a->strength = strength_of(q, part, a->i, a->j, a->both, at, &a->slope);
+    a->damping = strength_of(q, part + 1, a->i, a->j, a->both, at, &a->damping_slope);
+    a->along = dot3(a->force, a->u);
+    a->approach = 0.0;
+    if (q->share[part + 1]) {
+        const size_t width = ascc_padded(plan->fluid_channels);
+        const float *motion = p->run->value[0].raw + ascc_plan_motion(plan, 0);
+        for (int32_t c = 0; c < plan->dimension; c++)
+            a->relative[c] = (double)motion[a->i * width + (size_t)c] -
+                             (a->both ? (double)motion[a->j * width + (size_t)c] : 0.0);
+        a->approach = dot3(a->relative, a->u);
+    }
+}
+
 /* One pair: line d from i to j, displacement r seen; parts `part` (strength) and part + 1 (damping). */
 static void pass_pair(const pairs_pass *q, int part, const ascc_filter *filter, size_t i, size_t j,
                       bool both, const double r[3], const double d[3])
 {
     const ascc_passing *p = q->p;
     const ascc_plan *plan = p->run->network->plan;
-    const double distance = sqrt(dot3(r, r)), length = sqrt(dot3(d, d));
-    if (length == 0.0)
+    pair a = {.i = i, .j = j, .both = both, .distance = sqrt(dot3(r, r)), .length = sqrt(dot3(d, d))};
+    if (a.length == 0.0)
         return;
-    const bumps_at at = find_bumps(distance / filter->radius, filter->bumps);
-    double u[3], force[3], slope, damping_slope, approach = 0.0, relative[3] = {0.0, 0.0, 0.0};
-    for (size_t c = 0; c < 3; c++) {
-        u[c] = d[c] / length;
-        force[c] = q->g[i * 3 + c] - (both ? q->g[j * 3 + c] : 0.0);
+    const bumps_at at = find_bumps(a.distance / filter->radius, filter->bumps);
+    find_pair(q, part, &at, r, d, &a);
+    for (int side = 0; side < (both ? 2 : 1); side++) {
+        add_share(q, part, side ? j : i, &at, a.cosine * a.along);
+        add_share(q, part + 1, side ? j : i, &at, -a.approach * a.along);
     }
-    const double strength = strength_of(q, part, i, j, both, &at, &slope);
-    const double damping = strength_of(q, part + 1, i, j, both, &at, &damping_slope);
-    const size_t a = ascc_padded(plan->fluid_channels);
-    const size_t motion = q->share[part + 1] ? (size_t)ascc_plan_motion(plan, 0) : 0;
-    if (q->share[part + 1]) {
-        const float *seen = p->run->value[0].raw + motion;
-        for (int32_t c = 0; c < plan->dimension; c++)
-            relative[c] = (double)seen[i * a + (size_t)c] -
-                          (both ? (double)seen[j * a + (size_t)c] : 0.0);
-        approach = dot3(relative, u);
-    }
-    const double along = dot3(force, u), approach_gradient = -damping * along;
-    add_share(q, part, i, &at, along);
-    add_share(q, part + 1, i, &at, -approach * along);
-    if (both) {
-        add_share(q, part, j, &at, along);
-        add_share(q, part + 1, j, &at, -approach * along);
-    }
-    if (q->share[part + 1] && p->value[0].raw)
+    if (q->share[part + 1] && p->value[0].raw) {
+        const size_t width = ascc_padded(plan->fluid_channels);
+        float *motion = p->value[0].raw + ascc_plan_motion(plan, 0);
         for (int32_t c = 0; c < plan->dimension; c++) {
-            const float g = (float)(approach_gradient * u[c]);
-            p->value[0].raw[i * a + motion + (size_t)c] += g;
+            const float g = (float)(-a.damping * a.along * a.u[c]);
+            motion[i * width + (size_t)c] += g;
             if (both)
-                p->value[0].raw[j * a + motion + (size_t)c] -= g;
-        }
-    if (!p->pass->seen)
-        return;
-    /* by r through the bumps, by d through the direction */
-    const double by_distance =
-        distance > 0.0 ? along * (slope - damping_slope * approach) / filter->radius / distance : 0.0;
-    double by_u[3], seen_i[3], seen_j[3], turned = 0.0;
-    for (size_t c = 0; c < 3; c++) {
-        by_u[c] = force[c] * (strength - damping * approach) + approach_gradient * relative[c];
-        turned += by_u[c] * u[c];
-    }
-    const size_t n = (size_t)plan->dimension;
-    const ascc_hierarchy *h = p->run->hierarchy;
-    for (size_t c = 0; c < 3; c++) {
-        const double by_d = (by_u[c] - turned * u[c]) / length;
-        seen_j[c] = by_distance * r[c] + (q->place ? 0.0 : by_d);
-        seen_i[c] = -seen_j[c];
-        if (q->place && c < n) {
-            p->pass->place[host_row(h, q->set, i) * n + c] -= by_d;
-            if (both)
-                p->pass->place[host_row(h, q->set, j) * n + c] += by_d;
+                motion[j * width + (size_t)c] -= g;
         }
     }
-    ascc_backward_place(p, q->set, i, seen_i);
-    if (both)
-        ascc_backward_place(p, q->set, j, seen_j);
+    if (p->pass->seen)
+        pass_places(q, &a, filter);
 }
 
 static bool take_shares(pairs_pass *q)
@@ -233,17 +267,12 @@ static void pass_walls(const pairs_pass *q)
     const ascc_network *network = p->run->network;
     const ascc_filter *filter = &network->plan->output.walls.filter;
     const ascc_rows *rows = &p->run->rows[network->wall_key];
-    const ascc_points *wall = rows->source;
-    const double unit = p->run->hierarchy->scale.unit;
     for (size_t i = 0; i < rows->query->count; i++)
         for (size_t k = rows->start[i]; k < rows->start[i] + rows->count[i]; k++) {
             const size_t j = rows->neighbor[k];
-            double r[3], d[3];
+            double r[3];
             displacement(q, rows, i, j, r);
-            for (int c = 0; c < 3; c++)
-                d[c] = q->place ? unit * (double)wall->position[c][j] - q->place[i * 3 + (size_t)c]
-                                : r[c];
-            pass_pair(q, ASCC_PART_WALL, filter, i, j, false, r, d);
+            pass_pair(q, ASCC_PART_WALL, filter, i, j, false, r, r);
         }
 }
 

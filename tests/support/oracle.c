@@ -641,13 +641,16 @@ static void central_pair(const network_state *n, const ascc_filter *filter, cons
     const ascc_plan *plan = &n->o->model->plan;
     const double length = sqrt(seen[0] * seen[0] + seen[1] * seen[1] + seen[2] * seen[2]);
     double line[3] = {seen[0], seen[1], seen[2]}, approach = 0.0;
-    for (int c = 0; plan->output.current_direction && c < 3; c++)
-        line[c] =
-            (wall_at ? wall_at : n->sets->before + j * 3)[c] - n->sets->before[i * 3 + (size_t)c];
+    const bool before = plan->output.current_direction && !wall_at;
+    for (size_t c = 0; before && c < 3; c++)
+        line[c] = n->sets->before[j * 3 + c] - n->sets->before[i * 3 + c];
     const double across = sqrt(line[0] * line[0] + line[1] * line[1] + line[2] * line[2]);
     if (across == 0.0 || length == 0.0)
         return;
     double strength = strength_of(n, filter, tensor, f, length);
+    if (before)
+        strength *=
+            (line[0] * seen[0] + line[1] * seen[1] + line[2] * seen[2]) / (across * length);
     for (int c = 0; damping && c < plan->dimension; c++)
         approach += (motion_of(n, i, c) - (wall_at ? 0.0 : motion_of(n, j, c))) * line[c] / across;
     if (damping)
