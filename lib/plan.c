@@ -92,6 +92,8 @@ static ascc_status check_levels(ascc_plan_builder *builder)
             return FAIL("level %d: 'voxel' must be a positive length", (int)i);
         }
     }
+    if (plan->level_count > 1 && plan->centroid_anchor && plan->sampling != ASCC_SAMPLING_CORNERS)
+        return FAIL("the anchor 'centroid' is for 'voxel_corners' only");
     if (!(plan->hysteresis >= 0.0 && plan->hysteresis <= 0.5))
         return FAIL("hysteresis is %g voxels, but must be within [0, 0.5]", plan->hysteresis);
     return ASCC_OK;
