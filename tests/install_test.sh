@@ -28,7 +28,7 @@ install_it() {
     prefix=$(meson introspect --buildoptions "$build" |
         sed 's/.*"name": "prefix", "value": "\([^"]*\)".*/\1/')
     mv "$folder$prefix" "$folder/root" && pc=$(find "$folder/root" -name ascc.pc) && [ -n "$pc" ] &&
-        sed -i "s|^prefix=.*|prefix=$folder/root|" "$pc" && libdir=$(dirname "$pc")/..
+        sed -i "s|^prefix=.*|prefix=$folder/root|" "$pc" "$(dirname "$pc")/ascc-train.pc" && libdir=$(dirname "$pc")/..
 }
 check 'it installs' install_it
 libdir=$(cd "$libdir" && pwd)
@@ -58,6 +58,13 @@ check 'pkg-config and the program agree on the version' pkg_version
             "$2/save_demo" 3 "$2/demo3.safetensors" && "$2/save_demo" 2 "$2/demo2.safetensors"' \
         sh "$PWD" "$folder" "$flags"
 }
+# shellcheck disable=SC2046
+check 'learn.c builds as C99 against libascc-train alone' cc -std=c99 $warnings examples/learn.c \
+    -o "$folder/learn" $(pkg-config --cflags --libs ascc-train)
+learns() { "$folder/learn" examples/models/water2d-tiny.safetensors | grep -c loss | grep -qx 10; }
+check 'learn trains the installed way' learns
+refuses_nothing() { "$folder/learn" /nonexistent; [ $? -eq 1 ]; }
+check 'learn says so when there is no model' refuses_nothing
 for host in hello hello_cpp; do
     for dimension in 2 3; do
         check "$host runs in ${dimension}D" "$folder/$host" "$folder/demo$dimension.safetensors"
@@ -75,6 +82,10 @@ needs() {
         grep -vE '^(libc|libm|libpthread|ld-linux.*)\.so'
 }
 check 'it needs libc, libm and threads alone' needs
+trainer() {
+    ! nm -D --defined-only "$libdir/libascc-train.so" | awk '{ print $3 }' | grep -v '^ascc_trainer_'
+}
+check 'libascc-train exports ascc_trainer_* alone' trainer
 exports() { nm -D --defined-only "$library" | awk '{ print $3 }' | LC_ALL=C sort | diff - tests/exports.txt; }
 check 'it exports what tests/exports.txt lists' exports
 only_ours() { ! nm -D --defined-only "$library" | awk '{ print $3 }' | grep -v '^ascc_'; }

@@ -19,6 +19,7 @@ typedef struct options {
     const char *sequence[MOST_SEQUENCES];
     size_t sequence_count;
     int32_t threads;
+    size_t every;
     bool quiet;
 } options;
 
@@ -31,6 +32,7 @@ static int usage(FILE *file)
     for (size_t k = 0; ascc_methods[k]; k++)
         fprintf(file, "  %s\n", ascc_methods[k]->help);
     fputs("\noptions\n"
+          "  --every K          take each K-th frame of the sequences (1)\n"
           "  --threads N        threads to use (1); numbers do not depend on it\n"
           "  --json FILE        figures as JSON\n"
           "  --csv FILE         figures as CSV, one a line\n"
@@ -64,7 +66,9 @@ static bool read_frames(const char *text, options *o)
 static bool read_option(const char *name, const char *value, options *o)
 {
     long number;
-    if (strcmp(name, "--threads") == 0 && read_long(value, 1, &number) && number <= 1024)
+    if (strcmp(name, "--every") == 0 && read_long(value, 1, &number) && number <= 100000)
+        o->every = (size_t)number;
+    else if (strcmp(name, "--threads") == 0 && read_long(value, 1, &number) && number <= 1024)
         o->threads = (int32_t)number;
     else if (strcmp(name, "--json") == 0)
         o->json = value;
@@ -133,7 +137,7 @@ static bool write_reports(const options *o, const ascc_report_run *runs)
 
 int ascc_command_eval(int argc, char **argv)
 {
-    options o = {.threads = 1, .measure.velocity = -1};
+    options o = {.threads = 1, .every = 1, .measure.velocity = -1};
     if (argc > 0 && (strcmp(argv[0], "--help") == 0 || strcmp(argv[0], "-h") == 0))
         return usage(stdout);
     if (!read_arguments(argc, argv, &o))
@@ -152,6 +156,7 @@ int ascc_command_eval(int argc, char **argv)
         name_sequence(o.sequence[k], runs[k].sequence, sizeof runs[k].sequence);
         fine = ascc_truth_load(o.sequence[k], o.threads, &t, &error);
         if (fine) {
+            ascc_truth_thin(&t, o.every);
             fine = ascc_evaluate(&o.measure, method, settings, &t, &runs[k], &error);
             ascc_truth_free(&t);
         }

@@ -55,6 +55,24 @@ void ascc_truth_free(ascc_truth *t)
     free(t->normal);
 }
 
+static void thin(double *rows, size_t row, size_t frames, size_t every)
+{
+    for (size_t f = 1; f * every < frames; f++)
+        memmove(rows + f * row, rows + f * every * row, row * sizeof *rows);
+}
+
+void ascc_truth_thin(ascc_truth *t, size_t every)
+{
+    const size_t row = t->scene.fluid_count * (size_t)t->scene.dimension;
+    const bool moving = t->velocity_frames == t->frames;
+    thin(t->position, row, t->frames, every);
+    if (moving)
+        thin(t->velocity, row, t->frames, every);
+    t->frames = (t->frames + every - 1) / every;
+    t->velocity_frames = moving ? t->frames : 1;
+    t->scene.time_step *= (double)every;
+}
+
 bool ascc_truth_load(const char *path, int32_t threads, ascc_truth *t, ascc_method_error *error)
 {
     ascc_sequence s;

@@ -21,6 +21,8 @@ typedef struct ascc_truth {
 bool ascc_truth_load(const char *path, int32_t threads, ascc_truth *truth,
                      ascc_method_error *error);
 void ascc_truth_free(ascc_truth *truth);
+/** Keeps every k-th frame, from the first: k times as long between frames. */
+void ascc_truth_thin(ascc_truth *truth, size_t every);
 
 /** What to measure; zero, but velocity = -1, is everything but transport, as docs/measures.md says. */
 typedef struct ascc_evaluate_options {

@@ -195,15 +195,7 @@ static bool load_truths(training *t)
         ascc_method_error why = {""};
         if (!ascc_truth_load(valid->source[i].path, t->threads, truth, &why))
             return fail(t, "valid", why.text);
-        const size_t row =
-            truth->scene.fluid_count * (size_t)truth->scene.dimension * sizeof(double);
-        const bool moving = truth->velocity_frames == truth->frames;
-        thin(truth->position, row, truth->frames, every);
-        if (moving)
-            thin(truth->velocity, row, truth->velocity_frames, every);
-        truth->frames = thinned(truth->frames, every);
-        truth->velocity_frames = moving ? truth->frames : 1;
-        truth->scene.time_step *= (double)every;
+        ascc_truth_thin(truth, every);
     }
     return true;
 }
