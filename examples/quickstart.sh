@@ -9,25 +9,14 @@ setup || exit 1
 [ -f build/build.ninja ] || meson setup build || exit 1
 meson compile -C build || exit 1
 
-# The published network where it is at hand; it is not part of libascc.
-model=${1:-../shared/data/weights/dmcf-liquid3d.safetensors}
-if [ -f "$model" ]; then
-    what="the network in $model"
-    set -- --size 16 -n 75 --every 3
-else
-    what="the demonstration model, which is not trained (no network at $model)"
-    model=demo
-    set -- --size 16 -n 600 --every 24
-fi
-
+model=${1:-examples/models/water3d.safetensors}
 out=build/dam-break
 rm -rf "$out"
 mkdir -p "$out" || exit 1
-echo "Running $what on a 3D dam break."
-build/examples/ascc sim "$model" dam-break-3d "$@" --threads "$(getconf _NPROCESSORS_ONLN)" \
+echo "Running the network in $model on a 3D dam break."
+build/examples/ascc sim "$model" dam-break-3d --size 24 -n 100 --every 4 --threads "$(getconf _NPROCESSORS_ONLN)" \
     -o "$out/dam-break.safetensors" --frames "$out/frames" || exit 1
 echo
-echo "This was $what."
 echo "Pictures: $out/frames/*.png ($(find "$out/frames" -name '*.png' | wc -l | tr -d ' '))"
 echo "Sequence: $out/dam-break.safetensors"
 if command -v ffmpeg >/dev/null 2>&1; then

@@ -18,6 +18,7 @@ const char *const ascc_architecture_outputs[2] = {"plain", "antisymmetric"};
 const char *const ascc_architecture_projections[2] = {"none", "radial"};
 const char *const ascc_architecture_samplings[3] = {"centers", "corners", "farthest"};
 const char *const ascc_architecture_evaluates[2] = {"current", "advected"};
+const char *const ascc_architecture_directions[2] = {"current", "seen"};
 
 static const double PI = 3.14159265358979323846;
 static const double FILL = 0.7; /* of the neighbours inside a lattice: fluids have surfaces */

@@ -34,6 +34,7 @@ extern const char *const ascc_architecture_outputs[2];     /* plain, antisymmetr
 extern const char *const ascc_architecture_projections[2]; /* none, radial */
 extern const char *const ascc_architecture_samplings[3];   /* centers, corners, farthest */
 extern const char *const ascc_architecture_evaluates[2];   /* current, advected */
+extern const char *const ascc_architecture_directions[2];  /* current, seen */
 
 typedef struct ascc_architecture {
     char name[64], description[256];
