@@ -112,7 +112,9 @@ static double layer_bytes(const ascc_plan *plan, double longest)
     for (int32_t t = 0; t < plan->term_count; t++) {
         const ascc_filter *filter = &plan->term[t].filter;
         const double cells = (double)filter->cells[0] * filter->cells[1] * filter->cells[2];
-        const double members = filter->bumps ? cells : 0.0;
+        const double relative =
+            plan->term[t].relative ? (double)ascc_padded(plan->term[t].inputs) : 0.0;
+        const double members = (filter->bumps ? cells : 0.0) + relative;
         if (ascc_term_searches(&plan->term[t]))
             most = fmax(most, 24.0 * (cells * (double)ascc_padded(plan->term[t].inputs) + 80.0) +
                                   (4.0 + members) * longest);
@@ -150,9 +152,10 @@ size_t ascc_estimate_scratch(const ascc_network *network, size_t fluid, size_t b
     const double forward =
         features + all * 4.0 + (double)threads * layer_bytes(plan, 1.5 * longest);
     const bool direct = !plan->output.filter.bumps && !plan->output.radial; /* sums of four */
-    const double last = all * (direct                      ? 41.0
-                               : plan->output.filter.bumps ? 41.0 + 8.0 * d
-                                                           : 9.0 + 8.0 * d);
+    double shares = plan->output.current_direction ? 24.0 : 0.0; /* and places */
+    for (int part = 0; part < ASCC_PARTS && plan->output.filter.bumps; part++)
+        shares += network->part_weight[part] ? 32.0 : 0.0;
+    const double last = all * (direct ? 41.0 : 9.0 + shares + 8.0 * d);
     double bytes = fmax(features + hierarchy_bytes(plan, f, b),
                         search + value_bytes(network, f, b) + fmax(forward, last));
     bytes = 1.125 * (points + bytes) + 64e3; /* what a block has more; small things */
