@@ -66,6 +66,7 @@ suite sanitize --buildtype=debugoptimized -Db_sanitize=address,undefined -Db_lun
 for t in tests/check_tree.sh tests/install_test.sh tests/cli_test.sh tests/train_test.sh tests/docs_test.sh tests/convert_test.sh tests/bench_test.sh tests/stability_test.sh tests/cross_test.sh; do
     [ -f "$t" ] && script "$t" build-release
 done
+script tests/models_test.sh build-release
 script tests/cli_test.sh build-sanitize
 script tests/train_test.sh build-sanitize
 

@@ -1,0 +1,58 @@
+#!/bin/sh
+# The networks that are shipped: small, as cheap as said, and exact about momentum; prints TAP.
+# $1: a build folder. SPDX-License-Identifier: MIT
+cd "$(dirname "$0")/.." || exit 1
+ascc=${1:-build}/examples/ascc
+number=0
+failed=0
+folder=$(mktemp -d) || exit 1
+trap 'rm -rf "$folder"' EXIT
+
+check() {
+    number=$((number + 1))
+    name=$1
+    shift
+    if "$@" >"$folder/out" 2>&1; then
+        echo "ok $number - $name"
+    else
+        echo "not ok $number - $name"
+        sed 's/^/# /' "$folder/out"
+        failed=1
+    fi
+}
+
+small() { [ "$(wc -c <"$1")" -le 1048576 ]; }
+card() { [ -f "docs/models/$1.md" ] && grep -q '^## Measured' "docs/models/$1.md"; }
+conserves() { "$ascc" info "$1" | grep -E "^ *conserves +$2"; }
+cheap() { "$ascc" info "$1" | awk -v most="$2" '/^ *cost/ { print; fine = $3 <= most } END { exit !fine }'; }
+# Two drops collide: no momentum is made or lost, in whole quanta.
+exact() { "$ascc" sim "$1" "droplets-$2" --size 8 -n 60 -o "$folder/d" 2>&1 | grep 'momentum error *0  (0 0 0 quanta'; }
+turns() {
+    "$ascc" sim "$1" "droplets-$2" --size 8 -n 60 -o "$folder/d" 2>&1 |
+        awk '/^angular mom. error/ { print; fine = $4 < 1e-6 } END { exit !fine }'
+}
+same() {
+    for threads in 1 3; do
+        "$ascc" sim "$1" "dam-break-$2" --size 8 -n 20 --threads $threads -o "$folder/t$threads" || return 1
+    done
+    cmp "$folder/t1" "$folder/t3"
+}
+
+for dimension in 2d 3d; do
+    for model in water$dimension water$dimension-tiny; do
+        file=examples/models/$model.safetensors
+        most=60000
+        [ $model = water$dimension-tiny ] && most=15000
+        check "$model is at most 1 MB" small "$file"
+        check "$model takes at most $most multiply-adds a particle" cheap "$file" $most
+        check "$model has a card with measurements" card $model
+        check "$model says that it conserves momentum" conserves "$file" momentum
+        check "$model conserves momentum to the bit when drops collide" exact "$file" $dimension
+        check "$model gives the same bits on three threads" same "$file" $dimension
+    done
+    tiny=examples/models/water$dimension-tiny.safetensors
+    check "water$dimension-tiny says that it conserves angular momentum" conserves "$tiny" 'momentum, angular momentum'
+    check "water$dimension-tiny conserves angular momentum when drops collide" turns "$tiny" $dimension
+done
+echo "1..$number"
+exit $failed
