@@ -41,7 +41,7 @@ table() {
         done ;;
     *2d*)
         for sequence in test/test_00 test/test_01; do
-            row "$name" "$model" 4 "$data/wbc2d/$sequence.safetensors"
+            row "$name" "$model" 2 "$data/wbc2d/$sequence.safetensors"
         done ;;
     esac
 }

@@ -102,13 +102,14 @@ ASCC_API ascc_status ascc_trainer_iterate(ascc_trainer *trainer, ascc_training_r
 
 /**
  * Loss and gradient of one rollout, not augmented: `presteps` steps without gradient from `frame` >= 1,
- * then `horizon` with; the stages of the options have one as long. gradient: [ascc_trainer_parameter_count] or NULL (then it is not computed).
+ * then `horizon` with; the stages of the options have one as long. gradient:
+ * [ascc_trainer_parameter_count] or NULL (then it is not computed).
  */
 ASCC_API ascc_status ascc_trainer_gradient(ascc_trainer *trainer, size_t sequence, size_t frame,
                                            int32_t presteps, int32_t horizon, double *loss,
                                            float *gradient);
 
-/** Numbers that are trained: the tensors of the file, in its order of names. */
+/** Numbers that are trained: the tensors of the file, in the order of its data. */
 ASCC_API size_t ascc_trainer_parameter_count(const ascc_trainer *trainer);
 ASCC_API ascc_status ascc_trainer_get_parameters(const ascc_trainer *trainer, float *values);
 ASCC_API ascc_status ascc_trainer_set_parameters(ascc_trainer *trainer, const float *values);
