@@ -23,7 +23,7 @@ static void *read_file(const char *path, size_t *size)
 int main(int count, char **arguments)
 {
     static float position[FRAMES][SIDE * SIDE][2];
-    const double spacing = 0.0125, dt = 0.01, gravity = -9.81;
+    const double spacing = 0.0125, dt = 0.005, gravity = -9.81;
     size_t size;
     void *model = read_file(count > 1 ? arguments[1] : "model.safetensors", &size);
 
