@@ -1,6 +1,6 @@
 #!/bin/sh
 # Measures, draws and writes docs/chart.md: sh bench/chart/run.sh [--build DIR] [--shared DIR]
-# [--model FILE]... [--draw]. Models are those of examples/models unless some are named; --draw measures
+# [--model FILE]... [--draw]. Models are the 3D ones of examples/models unless some are named; --draw measures
 # nothing and draws what docs/figures/chart.csv has. SPDX-License-Identifier: MIT
 cd "$(dirname "$0")/../.." || exit 1
 build=build
@@ -20,7 +20,7 @@ $2" ;;
     shift 2 || exit 2
 done
 if [ -z "$draw" ]; then
-    [ -n "$models" ] || models=$(ls examples/models/*.safetensors 2>/dev/null)
+    [ -n "$models" ] || models=$(ls examples/models/*3d*.safetensors 2>/dev/null)
     before=$(cut -d' ' -f1 /proc/loadavg)
     old=$IFS
     IFS='

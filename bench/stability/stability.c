@@ -120,7 +120,7 @@ static void choose_methods(suite *s)
     /* The project's own models, as the chart has them; kept until the end. */
     static glob_t own;
     if (!s->only_methods && !s->model_count &&
-        glob("examples/models/*.safetensors", 0, NULL, &own) == 0)
+        glob("examples/models/*3d*.safetensors", 0, NULL, &own) == 0)
         while (s->model_count < own.gl_pathc && s->model_count < MOST_METHODS)
             add_model(s, own.gl_pathv[s->model_count]);
     for (size_t k = 0; k < s->model_count; k++) {
