@@ -32,9 +32,10 @@ published() {
 import json, sys
 scene = json.load(open(sys.argv[2]))["scenes"][sys.argv[1]]
 for name in "dmcf", "cconv":
-    error, r = scene["one_and_two_step"]["fd"][name], scene["rollout_" + name]
-    print("| %s | published %s | %.2f / %.2f | %.2f | %.0f %% | %d of %d | %.3g J |" % (
-        sys.argv[1].split("/")[1], name.upper(), 1e3 * error["err_n1"], 1e3 * error["err_n2"],
+    error, r = scene["one_and_two_step"]["fd"].get(name), scene["rollout_" + name]
+    errors = "%.2f / %.2f" % (1e3 * error["err_n1"], 1e3 * error["err_n2"]) if error else "not given"
+    print("| %s | published %s | %s | %.2f | %.0f %% | %d of %d | %.3g J |" % (
+        sys.argv[1].split("/")[1], name.upper(), errors,
         1e3 * r["gt2pred_mean"], 100 * r["max_density_error_vs_truth_max"], r["escaped_final"],
         scene["fluid"], r["kinetic_J"][str(r["final_frame"])]))
 PYTHON
