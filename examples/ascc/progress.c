@@ -52,7 +52,7 @@ void ascc_progress_add(ascc_progress *p, size_t count)
 {
     p->done += count;
     const double time = p->visible ? now() : 0.0;
-    if (!p->visible || time - p->drawn < 0.1)
+    if (!p->visible || (time - p->drawn < 0.1 && p->done < p->total))
         return;
     p->drawn = time;
     draw(p, time);
