@@ -95,13 +95,6 @@ static void make_central(const pair_job *job, size_t i, const batch *b, double t
     }
 }
 
-/* The velocities' features of the fluid, [row][inputs]. */
-static const float *motion_of(const ascc_network_run *run, size_t row)
-{
-    const ascc_plan *plan = run->network->plan;
-    return run->value[0].raw + row * ascc_padded(plan->fluid_channels) + ascc_plan_motion(plan, 0);
-}
-
 /* Strengths times the cosine between the line before the step, d of these squares, and the line that the
  * network sees. */
 static void turn_strengths(const pair_job *job, size_t i, batch *b, double d[3][BATCH],
@@ -122,14 +115,17 @@ static void turn_strengths(const pair_job *job, size_t i, batch *b, double d[3][
 static void point_strengths(const pair_job *job, size_t i, const batch *b, bool damped, bool fluid,
                             const double square[BATCH], double t[3][BATCH])
 {
-    const int32_t d = job->run->network->plan->dimension;
+    const ascc_plan *plan = job->run->network->plan;
+    const int32_t d = plan->dimension;
     const double factor = job->scale->factor[0];
-    const float *own = damped ? motion_of(job->run, i) : NULL;
+    const size_t width = ascc_padded(plan->fluid_channels);
+    const float *motion = damped ? job->run->value[0].raw + ascc_plan_motion(plan, 0) : NULL;
+    const float *own = damped ? motion + i * width : NULL;
     for (size_t k = 0; k < b->count; k++) {
         const double length = sqrt(square[k]), inverse = length > 0.0 ? 1.0 / length : 0.0;
         double strength = (double)b->strength[k];
         if (damped) {
-            const float *other = fluid ? motion_of(job->run, b->neighbor[k]) : NULL;
+            const float *other = fluid ? motion + b->neighbor[k] * width : NULL;
             double approach = 0.0;
             for (int32_t c = 0; c < d; c++)
                 approach += ((double)own[c] - (other ? (double)other[c] : 0.0)) * t[c][k];
@@ -425,12 +421,6 @@ static void measure_rows(void *data, size_t begin, size_t end, int32_t slot)
         ;
 }
 
-/* Host's fluid row of a set row, or fluid_count + boundary row. */
-static size_t host_row(const ascc_hierarchy *h, int32_t set, size_t row)
-{
-    return h->origin[set == ASCC_SET_ALL ? row : h->whole[set][row]];
-}
-
 static ascc_status bad_value(const ascc_network_run *run, const float *values, size_t channels,
                              size_t set_row, size_t fluid_row)
 {
@@ -469,7 +459,7 @@ static ascc_status take_job(pair_job *job, int32_t set, const ascc_impulse_scale
         return ascc_fail(job->run->tools->message, ASCC_ERROR_MEMORY, "no memory for the impulses");
     memset(job->sum, 0, count * job->stride * sizeof(int64_t));
     for (size_t i = 0; i < count; i++) {
-        const size_t row = host_row(h, set, i);
+        const size_t row = ascc_hierarchy_host_row(h, set, i);
         fluid[i] = row < h->fluid_count;
         mass[i] = fluid[i] ? scale->mass[row] : 0.0;
         for (size_t c = 0; place && c < 3; c++)
@@ -506,7 +496,7 @@ static void give_sums(void *data, size_t begin, size_t end, int32_t slot)
     const ascc_hierarchy *h = job->from->run->hierarchy;
     const size_t d = (size_t)job->from->run->network->plan->dimension;
     for (size_t i = begin; i < end; i++) {
-        const size_t row = host_row(h, job->set, i);
+        const size_t row = ascc_hierarchy_host_row(h, job->set, i);
         int64_t *to = job->from->fluid[i] ? job->impulses->fluid + row * d
                                           : job->impulses->wall + (row - h->fluid_count) * d;
         memcpy(to, job->from->sum + i * job->from->stride, d * sizeof *to);
@@ -544,7 +534,7 @@ ascc_status ascc_antisymmetric_impulses(const ascc_network_run *run,
     const uint64_t bad = atomic_load(&job.bad_row);
     if (bad)
         return bad_value(run, output_values(run), ascc_padded(network->plan->output.inputs),
-                         (size_t)bad - 1, host_row(h, set, (size_t)bad - 1));
+                         (size_t)bad - 1, ascc_hierarchy_host_row(h, set, (size_t)bad - 1));
     sums_job sums = {&job, impulses, set};
     ascc_workers_run(run->tools->workers, count, 4096, give_sums, &sums);
     *pair_count = atomic_load(&job.pairs);
@@ -563,7 +553,7 @@ ascc_status ascc_plain_impulses(const ascc_network_run *run, const ascc_impulse_
     const size_t a = ascc_padded(network->plan->output.inputs);
     for (size_t i = 0; i < h->fluid_count; i++) {
         const size_t from = set == ASCC_SET_FLUID ? i : h->whole[ASCC_SET_FLUID][i];
-        const size_t row = host_row(h, set, from);
+        const size_t row = ascc_hierarchy_host_row(h, set, from);
         for (size_t c = 0; c < d; c++) {
             const double impulse =
                 (double)value[from * a + c] * scale->factor[c] * scale->mass[row];

@@ -83,8 +83,7 @@ static size_t arranged_size(const ascc_plan *plan, int32_t t)
     return cells * ascc_padded(term->inputs) * ascc_padded(term->outputs);
 }
 
-/* Weights of an output with a basis and their numbers of bumps, by part. */
-static const float *part_of(const ascc_output *output, int part, size_t *bumps)
+const float *ascc_output_part(const ascc_output *output, int part, size_t *bumps)
 {
     const float *const weights[ASCC_PARTS] = {output->weight, output->damping, output->walls.weight,
                                               output->walls.damping};
@@ -98,7 +97,7 @@ static void arrange_parts(const ascc_output *output, float *to)
     memset(to, 0, ASCC_PARTS * size * sizeof *to);
     for (int part = 0; part < ASCC_PARTS; part++, to += size) {
         size_t bumps;
-        const float *from = part_of(output, part, &bumps);
+        const float *from = ascc_output_part(output, part, &bumps);
         for (size_t k = 0; from && k < bumps; k++)
             for (size_t i = 0; i < a; i++)
                 to[i * ASCC_MAX_BUMPS + k] = from[k * a + i];
@@ -140,7 +139,7 @@ void ascc_network_arrange(ascc_network *network)
     const float *part = network->term_weight[plan->term_count];
     for (int p = 0; p < ASCC_PARTS && plan->output.filter.bumps; p++) {
         size_t bumps;
-        network->part_weight[p] = part_of(&plan->output, p, &bumps) ? part : NULL;
+        network->part_weight[p] = ascc_output_part(&plan->output, p, &bumps) ? part : NULL;
         part += ascc_padded(plan->output.inputs) * ASCC_MAX_BUMPS;
     }
 }

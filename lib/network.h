@@ -89,6 +89,8 @@ ascc_geometry ascc_network_geometry(const ascc_network_run *run, const ascc_rows
                                     const uint32_t *neighbor, size_t count, float *scratch,
                                     size_t room);
 
+/* Weights of a part of an output with a basis [bump][inputs], NULL = not there, and its bumps. */
+const float *ascc_output_part(const ascc_output *output, int part, size_t *bumps);
 /* Numbers of a filter's kernel: cells of a grid, members of a basis. */
 size_t ascc_cell_count(const ascc_filter *filter);
 /* The row of `to` that is the same particle as this row of `from`; false if there is none. */

@@ -55,21 +55,23 @@ void ascc_truth_free(ascc_truth *t)
     free(t->normal);
 }
 
-static void thin(double *rows, size_t row, size_t frames, size_t every)
+size_t ascc_thin_frames(void *rows, size_t row_size, size_t frames, size_t every)
 {
+    unsigned char *bytes = rows;
     for (size_t f = 1; f * every < frames; f++)
-        memmove(rows + f * row, rows + f * every * row, row * sizeof *rows);
+        memmove(bytes + f * row_size, bytes + f * every * row_size, row_size);
+    return frames ? (frames - 1) / every + 1 : 0;
 }
 
 void ascc_truth_thin(ascc_truth *t, size_t every)
 {
-    const size_t row = t->scene.fluid_count * (size_t)t->scene.dimension;
+    const size_t row = t->scene.fluid_count * (size_t)t->scene.dimension * sizeof(double);
     const bool moving = t->velocity_frames == t->frames;
-    thin(t->position, row, t->frames, every);
+    const size_t frames = ascc_thin_frames(t->position, row, t->frames, every);
     if (moving)
-        thin(t->velocity, row, t->frames, every);
-    t->frames = (t->frames + every - 1) / every;
-    t->velocity_frames = moving ? t->frames : 1;
+        (void)ascc_thin_frames(t->velocity, row, t->frames, every);
+    t->frames = frames;
+    t->velocity_frames = moving ? frames : 1;
     t->scene.time_step *= (double)every;
 }
 

@@ -21,6 +21,8 @@ typedef struct ascc_truth {
 bool ascc_truth_load(const char *path, int32_t threads, ascc_truth *truth,
                      ascc_method_error *error);
 void ascc_truth_free(ascc_truth *truth);
+/** Moves every k-th of `frames` rows of so many bytes to the front; returns how many those are. */
+size_t ascc_thin_frames(void *rows, size_t row_size, size_t frames, size_t every);
 /** Keeps every k-th frame, from the first: k times as long between frames. */
 void ascc_truth_thin(ascc_truth *truth, size_t every);
 

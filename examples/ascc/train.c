@@ -138,19 +138,6 @@ static const char *last_name(const char *path)
     return slash ? slash + 1 : path;
 }
 
-/* Rows of `row` values: each so many of `frames` move to the front. */
-static void thin(void *rows, size_t row_size, size_t frames, size_t every)
-{
-    unsigned char *bytes = rows;
-    for (size_t f = 1; f * every < frames; f++)
-        memmove(bytes + f * row_size, bytes + f * every * row_size, row_size);
-}
-
-static size_t thinned(size_t frames, size_t every)
-{
-    return frames ? (frames - 1) / every + 1 : 0;
-}
-
 static bool add_sequence(training *t, const ascc_train_source *source)
 {
     ascc_sequence s;
@@ -158,10 +145,11 @@ static bool add_sequence(training *t, const ascc_train_source *source)
     const size_t every = (size_t)source->every;
     if (!ascc_sequence_read(source->path, &s, why, sizeof why))
         return fail(t, "train", why);
-    thin(s.position, s.count * (size_t)s.dimension * sizeof *s.position, s.frames, every);
+    const size_t frames = ascc_thin_frames(
+        s.position, s.count * (size_t)s.dimension * sizeof *s.position, s.frames, every);
     const ascc_training_sequence sequence = {.size = sizeof sequence,
                                              .name = last_name(source->path),
-                                             .frame_count = thinned(s.frames, every),
+                                             .frame_count = frames,
                                              .fluid_count = s.count,
                                              .boundary_count = s.walls,
                                              .position = s.position,

@@ -86,14 +86,12 @@ static void fold_output(const ascc_plan *plan, const float *base, const float *a
     const ascc_output *output = &plan->output;
     const size_t a = (size_t)output->inputs, a8 = ascc_padded(output->inputs);
     if (output->filter.bumps) {
-        const float *const part[ASCC_PARTS] = {output->weight, output->damping,
-                                               output->walls.weight, output->walls.damping};
         for (int p = 0; p < ASCC_PARTS; p++, arranged += part_size(plan)) {
-            const size_t bumps = (size_t)(p < ASCC_PART_WALL ? output->filter.bumps
-                                                             : output->walls.filter.bumps);
-            for (size_t k = 0; part[p] && k < bumps; k++)
+            size_t bumps;
+            const float *part = ascc_output_part(output, p, &bumps);
+            for (size_t k = 0; part && k < bumps; k++)
                 for (size_t i = 0; i < a; i++)
-                    gradient[(size_t)(part[p] - base) + k * a + i] +=
+                    gradient[(size_t)(part - base) + k * a + i] +=
                         arranged[i * ASCC_MAX_BUMPS + k];
         }
         return;
@@ -191,7 +189,7 @@ void ascc_backward_place(const ascc_passing *p, int32_t set, size_t row, const d
     const ascc_hierarchy *h = p->run->hierarchy;
     if (set != ASCC_SET_FLUID && set != ASCC_SET_ALL)
         return; /* walls and lattices stay where they are */
-    const size_t origin = h->origin[set == ASCC_SET_ALL ? row : h->whole[set][row]];
+    const size_t origin = ascc_hierarchy_host_row(h, set, row);
     const size_t d = (size_t)p->run->network->plan->dimension;
     if (origin < h->fluid_count)
         for (size_t c = 0; c < d; c++)

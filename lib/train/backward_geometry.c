@@ -208,15 +208,6 @@ void ascc_backward_scatter_grid(const ascc_passing *p, const ascc_term *term,
 
 /* ---- Positions ---- */
 
-static void seen_displacement(const ascc_passing *p, const ascc_rows *rows, size_t row, size_t j,
-                              double r[3])
-{
-    for (int c = 0; c < 3; c++)
-        r[c] = p->run->hierarchy->scale.unit *
-               (double)(int32_t)((uint32_t)rows->source->low[c][j] -
-                                 (uint32_t)rows->query->low[c][row]);
-}
-
 static void add_displacement(const ascc_passing *p, const ascc_term *term, size_t row, size_t j,
                              const double g[3])
 {
@@ -300,7 +291,7 @@ static void hat_pairs(const ascc_passing *p, const ascc_term *term, const ascc_r
         }
         for (size_t k = 0; k < count; k++) {
             double r[3], hat[3], slope[3], g[3];
-            seen_displacement(p, rows, row, neighbor[k], r);
+            ascc_seen_displacement(p, rows, row, neighbor[k], r);
             for (int c = 0; c < 3; c++) {
                 hat[c] = fmax(1.0 - fabs(r[c]) / term->voxel, 0.0);
                 slope[c] = hat[c] > 0.0 ? (r[c] > 0.0 ? -1.0 : r[c] < 0.0 ? 1.0 : 0.0) / term->voxel
@@ -330,7 +321,7 @@ static void grid_pairs(const ascc_passing *p, const ascc_term *term, const ascc_
         double r[3], g[3] = {0.0, 0.0, 0.0};
         ascc_place_in_cube at;
         ascc_trilinear t;
-        seen_displacement(p, rows, row, neighbor[k], r);
+        ascc_seen_displacement(p, rows, row, neighbor[k], r);
         ascc_place_in_cube_of(&term->filter, r, &at);
         ascc_trilinear_at(term->filter.cells, at.at, &t);
         const float *f = feature + read[k] * a;
@@ -369,7 +360,7 @@ void ascc_backward_geometry(const ascc_passing *p, const ascc_term *term, const 
                           p->dot, room);
     for (size_t k = 0; k < count; k++) {
         double r[3], g[3];
-        seen_displacement(p, rows, row, neighbor[k], r);
+        ascc_seen_displacement(p, rows, row, neighbor[k], r);
         basis_pair(p, &term->filter, k, r, g);
         add_displacement(p, term, row, neighbor[k], g);
     }

@@ -18,11 +18,6 @@ typedef struct pairs_pass {
     float *share[ASCC_PARTS], *share_gradient[ASCC_PARTS]; /* [row][8] */
 } pairs_pass;
 
-static size_t host_row(const ascc_hierarchy *h, int32_t set, size_t row)
-{
-    return h->origin[set == ASCC_SET_ALL ? row : h->whole[set][row]];
-}
-
 static bool take_pairs(pairs_pass *q)
 {
     const ascc_passing *p = q->p;
@@ -36,7 +31,7 @@ static bool take_pairs(pairs_pass *q)
         return false;
     const double steps = p->pass->step->time_step / plan->time_step / plan->time_step;
     for (size_t i = 0; i < count; i++) {
-        const size_t row = host_row(h, q->set, i);
+        const size_t row = ascc_hierarchy_host_row(h, q->set, i);
         fluid[i] = row < h->fluid_count;
         for (size_t c = 0; c < 3; c++) {
             const bool there = fluid[i] && c < d;
@@ -49,15 +44,6 @@ static bool take_pairs(pairs_pass *q)
     q->place = plan->output.current_direction ? place : NULL;
     q->fluid = fluid;
     return true;
-}
-
-/* Displacement as the network sees it, m. */
-static void displacement(const pairs_pass *q, const ascc_rows *rows, size_t i, size_t j, double r[3])
-{
-    const double unit = q->p->run->hierarchy->scale.unit;
-    for (int c = 0; c < 3; c++)
-        r[c] = unit * (double)(int32_t)((uint32_t)rows->source->low[c][j] -
-                                        (uint32_t)rows->query->low[c][i]);
 }
 
 static double dot3(const double a[3], const double b[3])
@@ -146,8 +132,8 @@ static void pass_places(const pairs_pass *q, const pair *a, const ascc_filter *f
             seen_j[c] += (by_seen[c] - seen_turned * a->seen[c]) / a->distance;
         seen_i[c] = -seen_j[c];
         if (before && c < n) {
-            p->pass->place[host_row(h, q->set, a->i) * n + c] -= by_d;
-            p->pass->place[host_row(h, q->set, a->j) * n + c] += by_d;
+            p->pass->place[ascc_hierarchy_host_row(h, q->set, a->i) * n + c] -= by_d;
+            p->pass->place[ascc_hierarchy_host_row(h, q->set, a->j) * n + c] += by_d;
         }
     }
     ascc_backward_place(p, q->set, a->i, seen_i);
@@ -271,7 +257,7 @@ static void pass_walls(const pairs_pass *q)
         for (size_t k = rows->start[i]; k < rows->start[i] + rows->count[i]; k++) {
             const size_t j = rows->neighbor[k];
             double r[3];
-            displacement(q, rows, i, j, r);
+            ascc_seen_displacement(q->p, rows, i, j, r);
             pass_pair(q, ASCC_PART_WALL, filter, i, j, false, r, r);
         }
 }
@@ -352,7 +338,7 @@ static void pass_pairs(const pairs_pass *q)
             if (j == i || (j < i && q->fluid[j]))
                 continue;
             double r[3], d[3];
-            displacement(q, rows, i, j, r);
+            ascc_seen_displacement(q->p, rows, i, j, r);
             if (!q->place && dot3(r, r) == 0.0)
                 continue; /* coincident: no impulse */
             for (size_t c = 0; c < 3; c++)

@@ -26,6 +26,16 @@ typedef struct ascc_passing {
     float *dot;             /* [member][room] */
 } ascc_passing;
 
+/* From a query row to a source row as the network sees them, m. */
+static inline void ascc_seen_displacement(const ascc_passing *p, const ascc_rows *rows, size_t row,
+                                          size_t j, double r[3])
+{
+    for (int c = 0; c < 3; c++)
+        r[c] = p->run->hierarchy->scale.unit *
+               (double)(int32_t)((uint32_t)rows->source->low[c][j] -
+                                 (uint32_t)rows->query->low[c][row]);
+}
+
 /* Gradients of the output layer: its source, its weights, velocities, positions. */
 ascc_status ascc_backward_output(ascc_passing *p);
 

@@ -76,18 +76,6 @@ static double percentile(const histogram *h, double share)
     return h->high;
 }
 
-static double square_between(const ascc_near *near, size_t i, size_t j)
-{
-    double square = 0.0;
-    for (int c = 0; c < 3; c++) {
-        const double e = (double)(near->rows.source->position[c][j] -
-                                  near->rows.query->position[c][i]) /
-                         near->rows.radius;
-        square += e * e;
-    }
-    return square;
-}
-
 static ascc_status measure_fluid(ascc_kept_sequence *s, const ascc_plan *plan, size_t frame,
                                  const double *x, const ascc_search_tools *tools, histogram *dense)
 {
@@ -104,8 +92,9 @@ static ascc_status measure_fluid(ascc_kept_sequence *s, const ascc_plan *plan, s
     for (size_t i = 0; status == ASCC_OK && i < s->fluid_count; i++) {
         double rho = 0.0;
         for (uint32_t k = 0; k < near.rows.count[i]; k++) {
+            double e[3];
             const double t =
-                1.0 - square_between(&near, i, near.rows.neighbor[near.rows.start[i] + k]);
+                1.0 - ascc_near_separation(&near, i, near.rows.neighbor[near.rows.start[i] + k], e);
             rho += t > 0.0 ? t * t * t : 0.0;
         }
         note(dense, rho);
@@ -125,7 +114,8 @@ static ascc_status measure_walls(const ascc_kept_sequence *s, const ascc_plan *p
         double nearest = INFINITY, distance = 0.0;
         for (uint32_t k = 0; k < near.rows.count[i]; k++) {
             const size_t j = near.rows.neighbor[near.rows.start[i] + k];
-            const double square = square_between(&near, i, j);
+            double e[3];
+            const double square = ascc_near_separation(&near, i, j, e);
             if (square >= nearest)
                 continue;
             nearest = square;

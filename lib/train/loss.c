@@ -31,17 +31,6 @@ static double distance_loss(const ascc_rollout_task *task, const ascc_plan *plan
     return sum;
 }
 
-static void separation(const ascc_near *near, size_t i, size_t j, double radius, double e[3],
-                       double *square)
-{
-    *square = 0.0;
-    for (int c = 0; c < 3; c++) {
-        e[c] = (double)(near->rows.source->position[c][j] - near->rows.query->position[c][i]) /
-               near->rows.radius * radius;
-        *square += e[c] * e[c];
-    }
-}
-
 static ascc_status density_loss(const ascc_rollout_task *task, const ascc_plan *plan,
                                 const ascc_search_tools *tools, const double *x, double share,
                                 double *loss, double *gradient)
@@ -55,7 +44,7 @@ static ascc_status density_loss(const ascc_rollout_task *task, const ascc_plan *
         const uint32_t *neighbor = near.rows.neighbor + near.rows.start[i];
         double rho = 0.0, e[3], square;
         for (uint32_t k = 0; k < near.rows.count[i]; k++) {
-            separation(&near, i, neighbor[k], 1.0, e, &square);
+            square = ascc_near_separation(&near, i, neighbor[k], e);
             const double t = fmax(1.0 - square, 0.0);
             rho += t * t * t;
         }
@@ -65,7 +54,7 @@ static ascc_status density_loss(const ascc_rollout_task *task, const ascc_plan *
         *loss += factor * excess * excess;
         const double by_rho = share * factor * 2.0 * excess / s->dense;
         for (uint32_t k = 0; gradient && k < near.rows.count[i]; k++) {
-            separation(&near, i, neighbor[k], 1.0, e, &square);
+            square = ascc_near_separation(&near, i, neighbor[k], e);
             const double t = fmax(1.0 - square, 0.0), by = by_rho * -6.0 * t * t / radius;
             for (size_t c = 0; c < d; c++) {
                 gradient[neighbor[k] * d + c] += by * e[c];
@@ -91,7 +80,7 @@ static ascc_status wall_loss(const ascc_rollout_task *task, const ascc_plan *pla
         double nearest = INFINITY, e[3], square, depth = 0.0;
         size_t at = 0;
         for (uint32_t k = 0; k < near.rows.count[i]; k++) {
-            separation(&near, i, neighbor[k], 1.0, e, &square);
+            square = ascc_near_separation(&near, i, neighbor[k], e);
             if (square < nearest) {
                 nearest = square;
                 at = neighbor[k];

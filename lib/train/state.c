@@ -11,14 +11,12 @@
 
 #define FAIL(status, ...) ascc_fail(&t->message, status, __VA_ARGS__)
 
-static bool alive(const ascc_trainer *t)
-{
-    return t && t->magic == ASCC_TRAINER_MAGIC;
-}
+/* The arrays of one block, in its order. */
+static const char *const names[] = {"weights", "average", "moment1", "moment2"};
 
 const void *ascc_trainer_model(ascc_trainer *t, int32_t averaged, size_t *size)
 {
-    if (!alive(t) || !size)
+    if (!ascc_trainer_alive(t) || !size)
         return NULL;
     const bool average = averaged && t->options.average > 0.0;
     ascc_safetensors *file = average ? &t->averaged_file : &t->file;
@@ -41,7 +39,6 @@ static uint64_t network_hash(const ascc_trainer *t)
 
 static bool write_state(const ascc_trainer *t, FILE *file)
 {
-    static const char *const names[] = {"weights", "average", "moment1", "moment2"};
     char header[1024];
     const size_t bytes = t->parameter_count * sizeof(float);
     int length = snprintf(header, sizeof header,
@@ -67,7 +64,7 @@ static bool write_state(const ascc_trainer *t, FILE *file)
 
 ascc_status ascc_trainer_save(const ascc_trainer *trainer, const char *path)
 {
-    if (!alive(trainer) || !path)
+    if (!ascc_trainer_alive(trainer) || !path)
         return ASCC_ERROR_ARGUMENT;
     ascc_trainer *t = (ascc_trainer *)trainer; /* a failure's message is the one change */
     const size_t length = strlen(path) + 5;
@@ -97,7 +94,6 @@ ascc_status ascc_trainer_save(const ascc_trainer *trainer, const char *path)
 
 static ascc_status read_state(ascc_trainer *t, const char *path, ascc_safetensors *file)
 {
-    static const char *const names[] = {"weights", "average", "moment1", "moment2"};
     const char *format = ascc_safetensors_metadata(file, "format");
     const char *version = ascc_safetensors_metadata(file, "version");
     const char *iteration = ascc_safetensors_metadata(file, "iteration");
@@ -126,7 +122,7 @@ static ascc_status read_state(ascc_trainer *t, const char *path, ascc_safetensor
 
 ascc_status ascc_trainer_load(ascc_trainer *t, const char *path)
 {
-    if (!alive(t) || !path)
+    if (!ascc_trainer_alive(t) || !path)
         return ASCC_ERROR_ARGUMENT;
     FILE *stream = fopen(path, "rb");
     if (!stream)

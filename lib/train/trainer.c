@@ -10,11 +10,6 @@
 
 #define FAIL(status, ...) ascc_fail(&t->message, status, __VA_ARGS__)
 
-static bool alive(const ascc_trainer *t)
-{
-    return t && t->magic == ASCC_TRAINER_MAGIC;
-}
-
 /* ---- Creation ---- */
 
 static ascc_status read_options(ascc_trainer *t, const ascc_trainer_options *given)
@@ -249,24 +244,24 @@ void ascc_trainer_destroy(ascc_trainer **trainer)
 
 const char *ascc_trainer_message(const ascc_trainer *t)
 {
-    return alive(t) ? t->message.text : "";
+    return ascc_trainer_alive(t) ? t->message.text : "";
 }
 
 uint64_t ascc_trainer_iteration(const ascc_trainer *t)
 {
-    return alive(t) ? t->iteration : 0;
+    return ascc_trainer_alive(t) ? t->iteration : 0;
 }
 
 /* ---- Parameters ---- */
 
 size_t ascc_trainer_parameter_count(const ascc_trainer *t)
 {
-    return alive(t) ? t->parameter_count : 0;
+    return ascc_trainer_alive(t) ? t->parameter_count : 0;
 }
 
 ascc_status ascc_trainer_get_parameters(const ascc_trainer *t, float *values)
 {
-    if (!alive(t) || !values)
+    if (!ascc_trainer_alive(t) || !values)
         return ASCC_ERROR_ARGUMENT;
     memcpy(values, t->weights, t->parameter_count * sizeof *values);
     return ASCC_OK;
@@ -295,7 +290,7 @@ void ascc_trainer_apply(ascc_trainer *t)
 
 ascc_status ascc_trainer_set_parameters(ascc_trainer *t, const float *values)
 {
-    if (!alive(t) || !values)
+    if (!ascc_trainer_alive(t) || !values)
         return ASCC_ERROR_ARGUMENT;
     for (size_t i = 0; i < t->tensor_count; i++)
         for (size_t k = t->tensor[i].first; k < t->tensor[i].first + t->tensor[i].count; k++)
@@ -378,7 +373,7 @@ static ascc_status rollout_failure(ascc_trainer *t, const ascc_rollout_task *tas
 ascc_status ascc_trainer_gradient(ascc_trainer *t, size_t sequence, size_t frame, int32_t presteps,
                                   int32_t horizon, double *loss, float *gradient)
 {
-    if (!alive(t) || !loss)
+    if (!ascc_trainer_alive(t) || !loss)
         return ASCC_ERROR_ARGUMENT;
     if (sequence >= t->sequence_count || frame < 1 || presteps < 0 || horizon < 1 ||
         (size_t)horizon > t->worker[0].kept_count ||
@@ -410,7 +405,7 @@ ascc_status ascc_trainer_gradient(ascc_trainer *t, size_t sequence, size_t frame
 
 ascc_status ascc_trainer_add_sequence(ascc_trainer *t, const ascc_training_sequence *sequence)
 {
-    if (!alive(t) || !sequence)
+    if (!ascc_trainer_alive(t) || !sequence)
         return ASCC_ERROR_ARGUMENT;
     ascc_training_sequence given;
     if (!ascc_read_struct(&given, sizeof given, sequence, sizeof given))
@@ -569,7 +564,7 @@ static ascc_status sum_up(ascc_trainer *t, ascc_training_report *report)
 ascc_status ascc_trainer_iterate(ascc_trainer *t, ascc_training_report *report)
 {
     ascc_training_report own = {0};
-    if (!alive(t))
+    if (!ascc_trainer_alive(t))
         return ASCC_ERROR_ARGUMENT;
     if (!report || !ascc_write_struct(report, &own, sizeof own, sizeof own))
         return FAIL(ASCC_ERROR_ARGUMENT, "ascc_training_report.size is not understood");

@@ -48,6 +48,11 @@ struct ascc_trainer {
     ascc_message message;
 };
 
+static inline bool ascc_trainer_alive(const ascc_trainer *t)
+{
+    return t && t->magic == ASCC_TRAINER_MAGIC;
+}
+
 /* The model takes over t->weights. */
 void ascc_trainer_apply(ascc_trainer *t);
 
