@@ -635,6 +635,48 @@ static void a_rollout_that_blows_up_leaves_the_weights_alone(void **state)
     }
 }
 
+static void weights_that_compute_nothing_are_taken_back(void **state)
+{
+    (void)state;
+    const model_random random = small(25, 2);
+    ascc_training_stage stages[] = {{.end = 3, .horizon = 1, .learning_rate = 1e-3},
+                                    {.end = 90, .horizon = 1, .learning_rate = 1e30}};
+    ascc_trainer_options o = default_options();
+    o.stage = stages;
+    o.stage_count = 2;
+    motion *m = make_motion(9, 2);
+    ascc_trainer *trainer = open_trainer(&o, &random, m);
+    iterate(trainer, 3);
+    float *good = parameters_of(trainer);
+    size_t size;
+    const void *model = ascc_trainer_model(trainer, 1, &size);
+    unsigned char *kept = malloc(size);
+    assert_non_null(kept);
+    memcpy(kept, model, size);
+
+    iterate(trainer, 1); /* beyond all bounds */
+    ascc_training_report report = {.size = sizeof report};
+    for (int i = 0; i < 19; i++) {
+        assert_int_equal(ascc_trainer_iterate(trainer, &report), ASCC_OK);
+        assert_int_equal(report.skipped, o.batch);
+    }
+    assert_int_equal(ascc_trainer_iterate(trainer, &report), ASCC_ERROR_NOT_FINITE);
+    assert_non_null(strstr(ascc_trainer_message(trainer), "sequence shaken, frame "));
+    assert_non_null(strstr(ascc_trainer_message(trainer), "back at iteration 3,"));
+    assert_int_equal(ascc_trainer_iteration(trainer), 3);
+    float *after = parameters_of(trainer);
+    assert_memory_equal(good, after, ascc_trainer_parameter_count(trainer) * sizeof *good);
+    size_t size_after;
+    model = ascc_trainer_model(trainer, 1, &size_after);
+    assert_int_equal(size_after, size);
+    assert_memory_equal(kept, model, size);
+    free(after);
+    free(kept);
+    free(good);
+    ascc_trainer_destroy(&trainer);
+    free(m);
+}
+
 static void training_lowers_the_loss(void **state)
 {
     (void)state;
@@ -780,6 +822,7 @@ int main(void)
         cmocka_unit_test(a_sequence_with_a_nan_is_refused_by_name),
         cmocka_unit_test(a_sequence_of_another_time_step_or_too_short_is_refused),
         cmocka_unit_test(a_rollout_that_blows_up_leaves_the_weights_alone),
+        cmocka_unit_test(weights_that_compute_nothing_are_taken_back),
         cmocka_unit_test(training_lowers_the_loss),
         cmocka_unit_test(augmentation_turns_the_whole_world),
         cmocka_unit_test(the_model_that_comes_out_has_the_weights),

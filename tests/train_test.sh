@@ -194,7 +194,8 @@ head -c -80 whole/m.safetensors >huge.safetensors
 for weight in 1 2 3 4 5 6 7 8 9 10 11 12 13 14 15 16 17 18 19 20; do
     printf '\377\377\177\177' >>huge.safetensors
 done
-refuses 1 'iteration 20: no rollout could be computed' train huge.json
+refuses 1 'nor any rollout of the 19 iterations before' train huge.json
+holds 'sequence and frame are named' grep -q 'iteration 21: sequence [0-9a-z_/.]*, frame [0-9]*: ' err
 holds 'the weights before are saved, and that is told' grep -q 'huge/m.checkpoint and huge/m.*hold iteration' err
 
 # ---- A damaged checkpoint, a full disk ----

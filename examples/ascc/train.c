@@ -40,7 +40,6 @@ typedef struct training {
     char label[160];
     double loss;     /* of late */
     double speed;    /* steps a second, of late */
-    int32_t skipped; /* iterations of late without any rollout */
     double saved;    /* when the last checkpoint was written, s */
     char error[512];
 } training;
@@ -319,23 +318,6 @@ static void show(training *t, const ascc_training_report *report)
     ascc_progress_add(&t->progress, 1);
 }
 
-/* An iteration without any rollout has no loss; many in a row learn nothing. */
-static bool count_skipped(training *t, ascc_training_report *report)
-{
-    enum { MOST = 20 };
-    if (report->skipped < t->config.options.batch) {
-        t->skipped = 0;
-        return true;
-    }
-    report->loss = NAN;
-    if (++t->skipped < MOST)
-        return true;
-    (void)snprintf(t->error, sizeof t->error,
-                   "iteration %" PRIu64 ": no rollout could be computed, nor in the %d before",
-                   report->iteration, MOST - 1);
-    return false;
-}
-
 static bool iterate(training *t)
 {
     ascc_training_report report = {.size = sizeof report};
@@ -345,17 +327,17 @@ static bool iterate(training *t)
                        ascc_trainer_iteration(t->trainer) + 1, ascc_trainer_message(t->trainer));
         return false;
     }
-    const bool learned = count_skipped(t, &report);
+    const bool learned = report.skipped < t->config.options.batch;
+    if (!learned) /* there is no loss, and weights that compute nothing are not to be kept */
+        report.loss = NAN;
     const bool due =
         report.iteration % t->config.validate_every == 0 || report.iteration == schedule_end(t);
     if (t->truth_count && due && !validate(t, &v))
         return false;
     if (!ascc_train_log_add(&t->log, stage_of(t, report.iteration), &report, &v))
         return fail(t, t->config.log, strerror(errno));
-    if (!learned)
-        return false;
     show(t, &report);
-    return now() - t->saved < t->config.checkpoint_seconds || save(t);
+    return !learned || now() - t->saved < t->config.checkpoint_seconds || save(t);
 }
 
 /* Whatever ends the run, the weights that are there are good ones: they are saved. */

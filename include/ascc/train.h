@@ -96,7 +96,9 @@ ASCC_API ascc_status ascc_trainer_add_sequence(ascc_trainer *trainer,
 /**
  * One iteration: `batch` rollouts, their mean gradient, one step of Adam.
  * errors: ARGUMENT (no sequence long enough), MEMORY, NOT_FINITE (a loss or gradient that is not finite:
- * weights and optimiser stay as they were; the message names sequence and frame).
+ * weights and optimiser stay as they were; or the twentieth iteration in a row of which no rollout could be
+ * computed: weights, optimiser and iteration are again what they were before the last change of weights;
+ * the message names sequence and frame).
  */
 ASCC_API ascc_status ascc_trainer_iterate(ascc_trainer *trainer, ascc_training_report *report);
 

@@ -116,6 +116,8 @@ static ascc_status read_state(ascc_trainer *t, const char *path, ascc_safetensor
                file->tensor[ascc_safetensors_find(file, names[i])].data,
                t->parameter_count * sizeof(float));
     t->iteration = strtoull(iteration, NULL, 10);
+    t->changed = false;
+    t->in_vain = 0;
     ascc_trainer_apply(t);
     return ASCC_OK;
 }

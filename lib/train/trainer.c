@@ -2,6 +2,7 @@
  * SPDX-License-Identifier: MIT */
 #include "trainer.h"
 
+#include <inttypes.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -9,6 +10,8 @@
 #include <time.h>
 
 #define FAIL(status, ...) ascc_fail(&t->message, status, __VA_ARGS__)
+
+#define IN_VAIN 20 /* iterations in a row without any rollout that end training */
 
 /* ---- Creation ---- */
 
@@ -119,8 +122,9 @@ static ascc_status take_arrays(ascc_trainer *t)
     t->result = take(t, batch, sizeof *t->result);
     t->drawn = take(t, batch, sizeof *t->drawn);
     t->weights = take(t, 4 * t->parameter_count, sizeof *t->weights);
+    t->before = take(t, 4 * t->parameter_count, sizeof *t->before);
     if (!t->arranged || !t->gradients || !t->gradient || !t->task || !t->result || !t->drawn ||
-        !t->weights)
+        !t->weights || !t->before)
         return ASCC_ERROR_MEMORY;
     t->average = t->weights + t->parameter_count;
     t->moment1 = t->average + t->parameter_count;
@@ -226,6 +230,7 @@ void ascc_trainer_destroy(ascc_trainer **trainer)
     give(t, t->result, batch, sizeof *t->result);
     give(t, t->drawn, batch, sizeof *t->drawn);
     give(t, t->weights, 4 * t->parameter_count, sizeof *t->weights);
+    give(t, t->before, 4 * t->parameter_count, sizeof *t->before);
     give(t, t->tensor, t->tensor_count, sizeof *t->tensor);
     if (t->file.tensor)
         ascc_safetensors_close(&t->file);
@@ -299,6 +304,7 @@ ascc_status ascc_trainer_set_parameters(ascc_trainer *t, const float *values)
                             "tensor '%s': number %zu is not finite, or negative where it damps",
                             t->file.tensor[i].name, k - t->tensor[i].first);
     memcpy(t->weights, values, t->parameter_count * sizeof *values);
+    t->changed = false;
     memcpy(t->average, values, t->parameter_count * sizeof *values);
     ascc_trainer_apply(t);
     return ASCC_OK;
@@ -561,6 +567,40 @@ static ascc_status sum_up(ascc_trainer *t, ascc_training_report *report)
     return ASCC_OK;
 }
 
+static void learn(ascc_trainer *t, const ascc_training_report *report)
+{
+    memcpy(t->before, t->weights, 4 * t->parameter_count * sizeof *t->weights);
+    t->before_iteration = t->iteration;
+    t->changed = true;
+    t->in_vain = 0;
+    adam(t, report->learning_rate, report->gradient_norm);
+    ascc_trainer_apply(t);
+}
+
+/* Many iterations in a row without any rollout learn nothing: the last change of the weights was one
+ * too many, and is taken back. */
+static ascc_status count_in_vain(ascc_trainer *t)
+{
+    const ascc_rollout_task *task = &t->task[t->batch - 1];
+    const size_t frame = t->result[t->batch - 1].failed_frame;
+    if (++t->in_vain < IN_VAIN)
+        return ASCC_OK;
+    t->in_vain = 0;
+    if (!t->changed)
+        return FAIL(ASCC_ERROR_NOT_FINITE,
+                    "sequence %s, frame %zu: the step could not be computed, nor any rollout of the "
+                    "%d iterations before",
+                    task->sequence->name, frame, IN_VAIN - 1);
+    memcpy(t->weights, t->before, 4 * t->parameter_count * sizeof *t->weights);
+    t->iteration = t->before_iteration;
+    t->changed = false;
+    ascc_trainer_apply(t);
+    return FAIL(ASCC_ERROR_NOT_FINITE,
+                "sequence %s, frame %zu: the step could not be computed, nor any rollout of the %d "
+                "iterations before; back at iteration %" PRIu64 ", the last with weights that do",
+                task->sequence->name, frame, IN_VAIN - 1, t->iteration);
+}
+
 ascc_status ascc_trainer_iterate(ascc_trainer *t, ascc_training_report *report)
 {
     ascc_training_report own = {0};
@@ -581,11 +621,11 @@ ascc_status ascc_trainer_iterate(ascc_trainer *t, ascc_training_report *report)
     ascc_workers_run(t->workers, (size_t)t->batch, 1, run_tasks, t);
     status = sum_up(t, &own);
     if (status == ASCC_OK) {
-        if (own.skipped < t->batch) {
-            adam(t, own.learning_rate, own.gradient_norm);
-            ascc_trainer_apply(t);
-        }
+        if (own.skipped < t->batch)
+            learn(t, &own);
         t->iteration++;
+        if (own.skipped == t->batch)
+            status = count_in_vain(t);
     }
     own.iteration = t->iteration;
     own.seconds = now() - begin;

@@ -45,6 +45,10 @@ struct ascc_trainer {
     uint64_t iteration;
     /* [parameters] each, one block: */
     float *weights, *average, *moment1, *moment2;
+    float *before;            /* the same four before the weights last changed */
+    uint64_t before_iteration;
+    int32_t in_vain;          /* iterations of late without any rollout */
+    bool changed;             /* there is a before */
     ascc_message message;
 };
 
