@@ -677,6 +677,40 @@ static void weights_that_compute_nothing_are_taken_back(void **state)
     free(m);
 }
 
+/* The weights after five iterations with so many steps before. */
+static float *learned_with(int32_t presteps, double truth_share, size_t *count)
+{
+    const model_random random = small(26, 2);
+    const ascc_training_stage stage = {
+        .end = 9, .horizon = 1, .presteps = presteps, .learning_rate = 1e-3};
+    ascc_trainer_options o = default_options();
+    o.stage = &stage;
+    o.truth_share = truth_share;
+    motion *m = make_motion(9, 2);
+    ascc_trainer *trainer = open_trainer(&o, &random, m);
+    iterate(trainer, 5);
+    float *values = parameters_of(trainer);
+    *count = ascc_trainer_parameter_count(trainer);
+    ascc_trainer_destroy(&trainer);
+    free(m);
+    return values;
+}
+
+static void the_share_of_true_states_takes_no_steps_before(void **state)
+{
+    (void)state;
+    size_t count;
+    float *none = learned_with(0, 0.0, &count), *all = learned_with(3, 1.0, &count);
+    float *half = learned_with(3, 0.5, &count), *usual = learned_with(3, 0.0, &count);
+    assert_memory_equal(none, all, count * sizeof *none);
+    assert_memory_not_equal(none, half, count * sizeof *none);
+    assert_memory_not_equal(usual, half, count * sizeof *none);
+    free(none);
+    free(all);
+    free(half);
+    free(usual);
+}
+
 static void training_lowers_the_loss(void **state)
 {
     (void)state;
@@ -823,6 +857,7 @@ int main(void)
         cmocka_unit_test(a_sequence_of_another_time_step_or_too_short_is_refused),
         cmocka_unit_test(a_rollout_that_blows_up_leaves_the_weights_alone),
         cmocka_unit_test(weights_that_compute_nothing_are_taken_back),
+        cmocka_unit_test(the_share_of_true_states_takes_no_steps_before),
         cmocka_unit_test(training_lowers_the_loss),
         cmocka_unit_test(augmentation_turns_the_whole_world),
         cmocka_unit_test(the_model_that_comes_out_has_the_weights),

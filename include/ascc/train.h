@@ -65,6 +65,8 @@ typedef struct ascc_trainer_options {
                                    computed a second time; 0 = 4 GiB */
     char *message;              /* where creation says what is wrong; may be NULL */
     size_t message_size;
+    double truth_share;         /* of rollouts begun at true states, without steps before them, [0, 1];
+                                   the others draw 0 to W */
 } ascc_trainer_options;
 
 /** What an iteration did. */

@@ -33,15 +33,17 @@ static ascc_status read_options(ascc_trainer *t, const ascc_trainer_options *giv
                         "10000, learning rates positive",
                         (int)i);
     }
-    const double numbers[] = {o->beta1, o->beta2, o->epsilon, o->clip, o->average, o->jitter,
-                              o->density_weight, o->wall_weight};
+    const double numbers[] = {o->beta1,          o->beta2,       o->epsilon,
+                              o->clip,           o->average,     o->jitter,
+                              o->density_weight, o->wall_weight, o->truth_share};
     for (size_t i = 0; i < sizeof numbers / sizeof *numbers; i++)
         if (!(numbers[i] >= 0.0 && isfinite(numbers[i])))
             return FAIL(ASCC_ERROR_ARGUMENT, "options: a number is negative or not finite");
     if (o->beta1 >= 1.0 || o->beta2 >= 1.0 || o->average >= 1.0 || o->thread_count < 0 ||
-        o->batch < 0 || o->batch > 65536 || !isfinite(o->neighbor_weight))
-        return FAIL(ASCC_ERROR_ARGUMENT, "options: beta1, beta2 and average must be below 1, "
-                                         "thread_count and batch not negative");
+        o->batch < 0 || o->batch > 65536 || !isfinite(o->neighbor_weight) || o->truth_share > 1.0)
+        return FAIL(ASCC_ERROR_ARGUMENT,
+                    "options: beta1, beta2 and average must be below 1, truth_share "
+                    "at most 1, thread_count and batch not negative");
     o->thread_count = o->thread_count ? o->thread_count : 1;
     o->batch = o->batch ? o->batch : 8;
     o->beta1 = o->beta1 > 0.0 ? o->beta1 : 0.9;
@@ -85,11 +87,11 @@ static ascc_status find_tensors(ascc_trainer *t)
         if (strcmp(tensor->type, "F32") != 0)
             return FAIL(ASCC_ERROR_FORMAT, "tensor '%s' is %s; only F32 can be trained",
                         tensor->name, tensor->type);
-        t->tensor[i] = (ascc_trained_tensor){
-            .first = t->parameter_count,
-            .count = tensor->count,
-            .offset = offset,
-            .damps = weights == plan->output.damping || weights == plan->output.walls.damping};
+        t->tensor[i] = (ascc_trained_tensor){.first = t->parameter_count,
+                                             .count = tensor->count,
+                                             .offset = offset,
+                                             .damps = weights == plan->output.damping ||
+                                                      weights == plan->output.walls.damping};
         t->parameter_count += tensor->count;
         offset += (tensor->count + 15) & ~(size_t)15;
     }
@@ -111,8 +113,7 @@ static ascc_status take_arrays(ascc_trainer *t)
     for (size_t i = 0; t->worker && i < threads; i++)
         if (!ascc_rollout_worker_open(&t->worker[i], t->context, t->model, longest))
             return ASCC_ERROR_MEMORY;
-    if (!t->worker ||
-        !ascc_transposed_create(&t->transposed, &t->worker[0].step->network))
+    if (!t->worker || !ascc_transposed_create(&t->transposed, &t->worker[0].step->network))
         return ASCC_ERROR_MEMORY;
     const size_t arranged = t->worker[0].step->network.weight_count;
     t->arranged = take(t, threads * arranged, sizeof *t->arranged);
@@ -211,9 +212,8 @@ void ascc_trainer_destroy(ascc_trainer **trainer)
     ascc_trainer *t = *trainer;
     *trainer = NULL;
     const size_t batch = (size_t)t->batch, threads = (size_t)t->thread_count;
-    const size_t arranged = t->worker && t->worker[0].step
-                                ? t->worker[0].step->network.weight_count
-                                : 0;
+    const size_t arranged =
+        t->worker && t->worker[0].step ? t->worker[0].step->network.weight_count : 0;
     if (t->transposed.block)
         ascc_transposed_destroy(&t->transposed, &t->worker[0].step->network);
     for (size_t i = 0; t->worker && i < threads; i++)
@@ -424,8 +424,8 @@ ascc_status ascc_trainer_add_sequence(ascc_trainer *t, const ascc_training_seque
     ascc_arena_reset(&t->worker[0].loss_scratch);
     const ascc_search_tools tools = {&t->worker[0].loss_scratch, t->context->workers,
                                      &t->context->kernels, &t->message};
-    const ascc_status status = ascc_kept_sequence_create(&t->sequence[t->sequence_count], &t->allocator,
-                                                    &t->model->plan, &given, &tools);
+    const ascc_status status = ascc_kept_sequence_create(
+        &t->sequence[t->sequence_count], &t->allocator, &t->model->plan, &given, &tools);
     if (status == ASCC_OK)
         t->sequence_count++;
     return status;
@@ -446,7 +446,8 @@ static const ascc_training_stage *find_stage(const ascc_trainer *t, double *rate
 }
 
 /* Frames that a rollout with this many steps can start from. */
-static size_t starts_of(const ascc_kept_sequence *s, const ascc_training_stage *stage, int32_t presteps)
+static size_t starts_of(const ascc_kept_sequence *s, const ascc_training_stage *stage,
+                        int32_t presteps)
 {
     const size_t steps = (size_t)presteps + (size_t)stage->horizon;
     return s->frame_count > steps + 1 ? s->frame_count - 1 - steps : 0;
@@ -455,7 +456,9 @@ static size_t starts_of(const ascc_kept_sequence *s, const ascc_training_stage *
 static ascc_status draw_task(ascc_trainer *t, const ascc_training_stage *stage, size_t b)
 {
     ascc_random random = ascc_random_open(t->options.seed, t->iteration, b);
-    const double presteps = ascc_random_uniform(&random) * (stage->presteps + 1.0);
+    const double share = t->options.truth_share, drawn = ascc_random_uniform(&random);
+    const double presteps =
+        drawn < share ? 0.0 : (drawn - share) / (1.0 - share) * (stage->presteps + 1.0);
     double sum = 0.0, edge = t->model->plan.spacing;
     for (size_t i = 0; i < t->sequence_count; i++)
         sum += starts_of(&t->sequence[i], stage, 0) ? t->sequence[i].share : 0.0;
@@ -496,9 +499,9 @@ static void run_tasks(void *data, size_t begin, size_t end, int32_t slot)
     const size_t weights = t->model->weight_count;
     const size_t arranged = t->worker[0].step->network.weight_count;
     for (size_t b = begin; b < end; b++)
-        t->result[b] = ascc_rollout_run(&t->worker[slot], &t->transposed, &t->task[b],
-                                        t->arranged + (size_t)slot * arranged,
-                                        t->gradients + b * weights);
+        t->result[b] =
+            ascc_rollout_run(&t->worker[slot], &t->transposed, &t->task[b],
+                             t->arranged + (size_t)slot * arranged, t->gradients + b * weights);
 }
 
 /* One step of Adam on the clipped gradient; damping stays without negative numbers. */
@@ -561,8 +564,9 @@ static ascc_status sum_up(ascc_trainer *t, ascc_training_report *report)
         square += (double)t->gradient[k] * (double)t->gradient[k];
     report->gradient_norm = sqrt(square);
     if (!isfinite(square))
-        return FAIL(ASCC_ERROR_NOT_FINITE, "sequence %s, frame %zu and others: the gradient is not "
-                                           "finite",
+        return FAIL(ASCC_ERROR_NOT_FINITE,
+                    "sequence %s, frame %zu and others: the gradient is not "
+                    "finite",
                     t->task[0].sequence->name, t->task[0].frame);
     return ASCC_OK;
 }
@@ -587,10 +591,11 @@ static ascc_status count_in_vain(ascc_trainer *t)
         return ASCC_OK;
     t->in_vain = 0;
     if (!t->changed)
-        return FAIL(ASCC_ERROR_NOT_FINITE,
-                    "sequence %s, frame %zu: the step could not be computed, nor any rollout of the "
-                    "%d iterations before",
-                    task->sequence->name, frame, IN_VAIN - 1);
+        return FAIL(
+            ASCC_ERROR_NOT_FINITE,
+            "sequence %s, frame %zu: the step could not be computed, nor any rollout of the "
+            "%d iterations before",
+            task->sequence->name, frame, IN_VAIN - 1);
     memcpy(t->weights, t->before, 4 * t->parameter_count * sizeof *t->weights);
     t->iteration = t->before_iteration;
     t->changed = false;
