@@ -10,7 +10,7 @@
 static const char *const windows[] = {"none", "poly6", "peak"};
 static const char *const mappings[] = {"identity", "radial", "volume"};
 static const char *const evaluations[] = {"current", "advected", "advected_mean"};
-static const char *const features[] = {"one", "velocity", "normal", "motion"};
+static const char *const features[] = {"one", "velocity", "normal", "motion", "gravity"};
 static const char *const samplings[] = {"voxel_centers", "voxel_corners", "farthest"};
 static const char *const anchors[] = {"world", "centroid"};
 static const char *const term_kinds[] = {"convolution", "dense", "identity", "transfer"};

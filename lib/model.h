@@ -123,6 +123,7 @@ typedef enum ascc_feature {
     ASCC_FEATURE_VELOCITY, /* fluid: after external forces, m/s; dimension channels */
     ASCC_FEATURE_NORMAL,   /* boundary; dimension channels */
     ASCC_FEATURE_MOTION,   /* velocity in spacings a time step; walls 0; dimension channels */
+    ASCC_FEATURE_GRAVITY,  /* fluid: the step's, in spacings a squared time step; dimension channels */
 } ascc_feature;
 #define ASCC_MAX_FEATURES 8
 

@@ -68,7 +68,8 @@ static ascc_status check_features(ascc_plan_builder *builder, const char *whose,
         return FAIL("%d features of the %s; at most %d", (int)count, whose, ASCC_MAX_FEATURES);
     for (int32_t i = 0; i < count; i++) {
         if (feature[i] != ASCC_FEATURE_ONE && feature[i] != ASCC_FEATURE_MOTION &&
-            feature[i] != (int32_t)vector)
+            feature[i] != (int32_t)vector &&
+            !(feature[i] == ASCC_FEATURE_GRAVITY && vector == ASCC_FEATURE_VELOCITY))
             return FAIL("a feature that the %s does not have", whose);
         for (int32_t j = 0; j < i; j++)
             if (feature[i] == feature[j])

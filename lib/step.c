@@ -131,14 +131,18 @@ static double lap(double *since)
 /* ---- What the network sees ---- */
 
 /* vector: m/s of fluid, a normal of boundary, in units of `factor`; motion: the factor that makes of it
- * spacings a time step. */
+ * spacings a time step; gravity: in spacings a squared time step. */
 static void features_of(const ascc_plan *plan, const int32_t *feature, int32_t feature_count,
-                        const double *vector, double factor, double motion, float *to)
+                        const double *vector, double factor, double motion, const double *gravity,
+                        float *to)
 {
     for (int32_t f = 0; f < feature_count; f++) {
         const double scale = feature[f] == ASCC_FEATURE_MOTION ? motion : factor;
         if (feature[f] == ASCC_FEATURE_ONE)
             *to++ = 1.0f;
+        else if (feature[f] == ASCC_FEATURE_GRAVITY)
+            for (int32_t c = 0; c < plan->dimension; c++)
+                *to++ = (float)gravity[c];
         else
             for (int32_t c = 0; c < plan->dimension; c++)
                 *to++ = (float)(vector[c] * scale);
@@ -147,7 +151,8 @@ static void features_of(const ascc_plan *plan, const int32_t *feature, int32_t f
 
 /* Features of all particles in the host's order; vectors in metres. */
 static bool take_features(const ascc_step *step, ascc_arena *arena, const ascc_particles *p,
-                          const ascc_advance *advance, float **fluid, float **boundary)
+                          const ascc_motion *outside, const ascc_advance *advance, float **fluid,
+                          float **boundary)
 {
     const ascc_plan *plan = &step->model->plan;
     const size_t d = (size_t)p->dimension;
@@ -157,13 +162,17 @@ static bool take_features(const ascc_step *step, ascc_arena *arena, const ascc_p
     if (!*fluid || !*boundary)
         return false;
     const double motion = step->length_unit * plan->time_step / plan->spacing;
+    double gravity[3];
+    for (size_t c = 0; c < d; c++)
+        gravity[c] = outside->gravity[c] * plan->time_step * motion;
     for (size_t i = 0; i < p->fluid_count; i++)
         features_of(plan, plan->fluid_features, plan->fluid_feature_count,
-                    advance->velocity + i * d, step->length_unit, motion,
+                    advance->velocity + i * d, step->length_unit, motion, gravity,
                     *fluid + i * (size_t)plan->fluid_channels);
     for (size_t i = 0; i < p->boundary_count; i++)
         features_of(plan, plan->boundary_features, plan->boundary_feature_count,
-                    p->wall_normal + i * d, 1.0, 0.0, *boundary + i * (size_t)plan->boundary_channels);
+                    p->wall_normal + i * d, 1.0, 0.0, gravity,
+                    *boundary + i * (size_t)plan->boundary_channels);
     return true;
 }
 
@@ -251,8 +260,8 @@ static bool take_advance(ascc_advance *advance, ascc_impulses *impulses, ascc_ar
 }
 
 /* Hierarchy, demand, layers, pair impulses: everything the model does. */
-static ascc_status run_network(ascc_step *step, const ascc_particles *p, ascc_step_trace *trace,
-                               double *since)
+static ascc_status run_network(ascc_step *step, const ascc_particles *p, const ascc_motion *motion,
+                               ascc_step_trace *trace, double *since)
 {
     const ascc_search_tools *tools = &trace->tools;
     const ascc_advance *advance = &trace->advance;
@@ -264,7 +273,7 @@ static ascc_status run_network(ascc_step *step, const ascc_particles *p, ascc_st
     float *fluid, *boundary;
     ascc_scene scene = {.fluid_count = p->fluid_count, .boundary_count = p->boundary_count};
     const ascc_arena_mark before_features = ascc_arena_mark_of(tools->arena);
-    const bool room = take_features(step, tools->arena, p, advance, &fluid, &boundary);
+    const bool room = take_features(step, tools->arena, p, motion, advance, &fluid, &boundary);
     const ascc_arena_mark before_scene = ascc_arena_mark_of(tools->arena);
     scene.fluid = scaled(tools, advance->position, p->fluid_count * d, step->length_unit);
     scene.boundary = scaled(tools, p->wall_position, p->boundary_count * d, step->length_unit);
@@ -349,7 +358,7 @@ ascc_status ascc_step_once(ascc_step *step, ascc_particles *p, const ascc_motion
     const ascc_search_tools *tools = &trace->tools;
     ascc_status status = ascc_integrate_begin(tools->workers, p, motion, advance, &step->message);
     if (status == ASCC_OK && p->fluid_count)
-        status = run_network(step, p, trace, &since);
+        status = run_network(step, p, motion, trace, &since);
     if (status == ASCC_OK)
         status =
             ascc_integrate_end(tools->workers, p, motion, impulses->fluid, advance, &step->message);

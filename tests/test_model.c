@@ -791,6 +791,7 @@ static void wrong_motions_dampings_and_walls_are_refused_by_name(void **state)
         {"[\"motion\",\"normal\"]", "[\"one\",\"one\"]", "twice"},
         {"[\"motion\",\"normal\"]", "[\"normal\",\"normal\"]", "twice"},
         {"\"motion\",\"normal\"", "\"motion\",\"velocity\"", "boundary"},
+        {"\"motion\",\"normal\"", "\"motion\",\"gravity\"", "boundary"},
         {"\"points\":\"fluid\"", "\"points\":\"all\"", "'relative'"},
         {"\"relative\":true", "\"relative\":1", "'relative'"},
         {"\"relative\":true", "\"relativ\":true", "'relativ'"},

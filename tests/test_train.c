@@ -385,6 +385,7 @@ static void gradients_of_motion_and_damping_are_right(void **state)
         gradient_case c = {.name = "motion", .random = small_basis(1400 + (uint64_t)v, 2 + v % 2)};
         c.random.fluid_only = 1;
         c.random.motion = 1 + v / 2 % 2;
+        c.random.gravity = v / 4 % 2;
         c.random.relative = v / 4 % 2;
         c.random.damping = v / 2 % 2;
         c.random.walls = v / 8 % 2;
@@ -403,6 +404,7 @@ static model_random everything(uint64_t seed, int dimension)
     r.fluid_only = r.relative = r.damping = r.walls = r.direction = r.transfer = 1;
     r.bumps = 3;
     r.motion = 2;
+    r.gravity = 1;
     r.levels = 2;
     r.trunk_layers = 2;
     r.method = "voxel_corners";

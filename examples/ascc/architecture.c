@@ -399,7 +399,7 @@ static void first_layer(writer *w)
                                       .source = "fluid",
                                       .relative = true,
                                       .self = true,
-                                      .inputs = 1 + a->dimension,
+                                      .inputs = 1 + (a->gravity_seen ? 2 : 1) * a->dimension,
                                       .outputs = a->channels,
                                       .bumps = a->bumps,
                                       .radius = a->radius * a->spacing,
@@ -573,8 +573,9 @@ static void basis_network(writer *w)
 {
     const ascc_architecture *a = w->a;
     char coarse[32], last[32] = "l0";
-    add(&w->network, ",\"features\":{\"fluid\":[\"one\",\"motion\"],"
-                     "\"boundary\":[\"one\",\"normal\",\"motion\"]},\"layers\":[");
+    add(&w->network, ",\"features\":{\"fluid\":[\"one\",\"motion\"%s],"
+                     "\"boundary\":[\"one\",\"normal\",\"motion\"]},\"layers\":[",
+        a->gravity_seen ? ",\"gravity\"" : "");
     first_layer(w);
     if (a->levels)
         coarse_layers(w, coarse);
@@ -828,6 +829,8 @@ static const char *grid_fault(const ascc_architecture *a)
 {
     if (a->damping)
         return "damping needs kernel basis";
+    if (a->gravity_seen)
+        return "gravity_seen needs kernel basis";
     if (a->channels < 4)
         return "kernel grid takes at least 4 channels";
     if (a->levels > APART * ((a->fine_layers - 1) / 2))

@@ -48,6 +48,7 @@ typedef struct ascc_architecture {
     double radius, wall_radius; /* spacings; wall_radius: of BASIS only */
     double output_radius;       /* of BASIS, spacings; 0 = radius */
     int32_t output_bumps;       /* of BASIS */
+    bool gravity_seen;   /* of BASIS: a feature of the fluid */
     bool seen_direction;        /* of BASIS: pairs act along the line that the network sees */
     int32_t bumps, order, wall_bumps;
     ascc_output_kind output;

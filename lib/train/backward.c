@@ -403,7 +403,8 @@ static void add_velocities(const ascc_passing *p)
         for (int32_t f = 0; f < plan->fluid_feature_count; f++) {
             const int32_t feature = plan->fluid_features[f];
             const double factor = feature == ASCC_FEATURE_MOTION ? motion : 1.0;
-            for (size_t c = 0; feature != ASCC_FEATURE_ONE && c < d; c++)
+            const bool moves = feature != ASCC_FEATURE_ONE && feature != ASCC_FEATURE_GRAVITY;
+            for (size_t c = 0; moves && c < d; c++)
                 to[c] += factor * (double)g[c];
             g += feature == ASCC_FEATURE_ONE ? 1 : d;
         }

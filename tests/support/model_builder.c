@@ -340,7 +340,8 @@ static void add_dense(random_network *n, const char *name, const char *source, i
 static void add_first_layer(random_network *n)
 {
     const int d = n->o.dimension, quarter = n->o.channels / 4;
-    const int in = 1 + (n->o.motion == 1 ? 2 * d : d), wall_in = 1 + (n->o.motion ? 2 * d : d);
+    const int in = 1 + (n->o.motion == 1 ? 2 * d : d) + (n->o.gravity ? d : 0);
+    const int wall_in = 1 + (n->o.motion ? 2 * d : d);
     model_text_add(&n->text, "{\"name\":\"l0.0\",\"points\":\"%s\",\"channels\":%d,\"terms\":[",
                    n->o.fluid_only ? "fluid" : "all", n->o.channels);
     n->terms = 0;
@@ -392,12 +393,12 @@ static void add_head(random_network *n)
                    "{\"name\":\"random\",\"description\":\"random weights, for tests\","
                    "\"dimension\":%d,\"time_step\":%s,\"gravity\":[0,-9.8125%s],"
                    "\"particle_spacing\":%s,\"rest_density\":1000,\"evaluate\":\"%s\","
-                   "\"features\":{\"fluid\":[%s],\"boundary\":[\"one\",\"normal\"%s]}",
+                   "\"features\":{\"fluid\":[%s%s],\"boundary\":[\"one\",\"normal\"%s]}",
                    o->dimension, model_number(0.005), third, model_number(o->spacing), o->evaluate,
                    o->motion == 2   ? "\"motion\",\"one\""
                    : o->motion == 1 ? "\"one\",\"velocity\",\"motion\""
                                     : "\"one\",\"velocity\"",
-                   o->motion ? ",\"motion\"" : "");
+                   o->gravity ? ",\"gravity\"" : "", o->motion ? ",\"motion\"" : "");
     if (o->boundary_crop > 0.0)
         model_text_add(&n->text, ",\"boundary_crop\":%s",
                        model_number(o->boundary_crop * o->spacing));

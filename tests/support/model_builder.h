@@ -77,6 +77,7 @@ typedef struct model_random {
     const char *type;       /* of the tensors; NULL = "F32" */
     int coarse;             /* 1: weights that F16 and BF16 hold exactly */
     int motion;   /* 1: the feature motion after the others; 2: in place of the velocity, before "one" */
+    int gravity;  /* 1: the feature gravity of the fluid, after the others */
     int relative; /* 1: convolutions of features see motion relative to the query's; fluid_only */
     int damping;  /* 1: of the last layer's pairs, and of its walls'; bumps, fluid_only, motion */
     int walls;    /* 1: the last layer acts on walls, with one bump more; bumps, fluid_only */

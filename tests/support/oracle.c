@@ -539,15 +539,17 @@ static void run_layer(network_state *n, int32_t l)
 }
 
 static void set_features(const ascc_plan *plan, const int32_t *feature, int32_t count,
-                         const double *vector, bool wall, double *to)
+                         const double *vector, const double *gravity, bool wall, double *to)
 {
     for (int32_t f = 0; f < count; f++)
         if (feature[f] == ASCC_FEATURE_ONE)
             *to++ = 1.0;
         else
             for (int c = 0; c < plan->dimension; c++)
-                *to++ = feature[f] != ASCC_FEATURE_MOTION ? vector[c]
-                        : wall                            ? 0.0
+                *to++ = feature[f] == ASCC_FEATURE_GRAVITY
+                            ? gravity[c] * plan->time_step * plan->time_step / plan->spacing
+                        : feature[f] != ASCC_FEATURE_MOTION ? vector[c]
+                        : wall                              ? 0.0
                                : vector[c] * plan->time_step / plan->spacing;
 }
 
@@ -559,12 +561,13 @@ static void run_layers(network_state *n, const double *velocity)
     n->value[0] = make_values(n, ASCC_SET_FLUID, plan->fluid_channels);
     n->value[1] = make_values(n, ASCC_SET_BOUNDARY, plan->boundary_channels);
     for (size_t i = 0; i < o->fluid_count; i++)
-        set_features(plan, plan->fluid_features, plan->fluid_feature_count, velocity + i * d, false,
+        set_features(plan, plan->fluid_features, plan->fluid_feature_count, velocity + i * d,
+                     o->gravity, false,
                      n->value[0].row + i * (size_t)plan->fluid_channels);
     for (size_t i = 0; i < n->sets->set[ASCC_SET_BOUNDARY].count; i++) {
         const size_t wall = n->sets->set[ASCC_SET_BOUNDARY].point[i].particle - o->fluid_count;
         set_features(plan, plan->boundary_features, plan->boundary_feature_count,
-                     o->normal + wall * d, true,
+                     o->normal + wall * d, o->gravity, true,
                      n->value[1].row + i * (size_t)plan->boundary_channels);
     }
     for (int32_t l = 0; l < plan->layer_count; l++)
