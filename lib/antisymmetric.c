@@ -110,14 +110,15 @@ static void turn_strengths(const pair_job *job, size_t i, batch *b, double d[3][
     }
 }
 
-/* Strengths along the lines d, of these squares, become vectors, damping included. Particles at one
- * place have no line. Walls do not move. */
+/* Strengths along the lines d, of these squares, become vectors, damping and limit included. Particles at
+ * one place have no line. Walls do not move. */
 static void point_strengths(const pair_job *job, size_t i, const batch *b, bool damped, bool fluid,
                             const double square[BATCH], double t[3][BATCH])
 {
     const ascc_plan *plan = job->run->network->plan;
     const int32_t d = plan->dimension;
     const double factor = job->scale->factor[0];
+    const double limit = ascc_output_limit(&plan->output);
     const size_t width = ascc_padded(plan->fluid_channels);
     const float *motion = damped ? job->run->value[0].raw + ascc_plan_motion(plan, 0) : NULL;
     const float *own = damped ? motion + i * width : NULL;
@@ -131,6 +132,7 @@ static void point_strengths(const pair_job *job, size_t i, const batch *b, bool 
                 approach += ((double)own[c] - (other ? (double)other[c] : 0.0)) * t[c][k];
             strength -= (double)b->damping[k] * (approach * inverse);
         }
+        strength = strength > limit ? limit : strength < -limit ? -limit : strength;
         const double share = strength * factor * inverse;
         for (int c = 0; c < 3; c++)
             t[c][k] *= share;

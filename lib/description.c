@@ -266,6 +266,8 @@ static void read_central(ascc_reader *reader, uint32_t object, ascc_output *outp
         output->current_direction =
             1 + ascc_reader_choice(reader, object, "direction", directions, COUNT(directions));
     names->damping = optional_text(reader, object, "damping");
+    if (ascc_reader_has(reader, object, "limit"))
+        output->limit = ascc_reader_number(reader, object, "limit", 1e-30, ASCC_PLAN_MAX);
     if (!ascc_reader_has(reader, object, "walls"))
         return;
     const uint32_t walls = ascc_reader_object(reader, object, "walls");
@@ -274,6 +276,9 @@ static void read_central(ascc_reader *reader, uint32_t object, ascc_output *outp
     names->wall_weight = ascc_reader_text(reader, walls, "kernel");
     names->wall_damping = optional_text(reader, walls, "damping");
     read_filter(reader, walls, &output->walls.filter, true);
+    if (ascc_reader_has(reader, walls, "contact"))
+        output->walls.contact = ascc_reader_number(reader, walls, "contact", 0.0,
+                                                   output->walls.filter.radius);
     ascc_reader_end(reader, walls);
     ascc_reader_where(reader, "output");
 }

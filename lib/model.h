@@ -11,6 +11,7 @@
 #ifndef ASCC_MODEL_H
 #define ASCC_MODEL_H
 
+#include <math.h>
 #include "context.h"
 
 #define ASCC_MAX_LEVELS 8
@@ -98,6 +99,7 @@ typedef struct ascc_wall_output {
     int32_t present, reserved;
     ascc_filter filter;           /* a basis */
     const float *weight, *damping; /* [bump][inputs]; damping or NULL */
+    double contact; /* m: no particle comes closer (contact.h); 0 = walls have no contact */
 } ascc_wall_output;
 
 typedef struct ascc_output {
@@ -116,7 +118,14 @@ typedef struct ascc_output {
     const float *damping; /* [bump][inputs], none negative, times the pair's speed of approach; or NULL */
     ascc_wall_output walls;
     double scale[3]; /* metres of position correction in one time step per unit of output */
+    double limit;    /* of a basis: the greatest such correction by one pair, m; 0 = none */
 } ascc_output;
+
+/* The greatest strength of a pair, in units of output. */
+static inline double ascc_output_limit(const ascc_output *output)
+{
+    return output->limit > 0.0 ? output->limit / fabs(output->scale[0]) : HUGE_VAL;
+}
 
 typedef enum ascc_feature {
     ASCC_FEATURE_ONE,

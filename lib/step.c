@@ -7,6 +7,7 @@
 #include <time.h>
 
 #include "arrays.h"
+#include "contact.h"
 #include "estimate.h"
 
 #define DEFAULT_MAX_NEIGHBORS 4096
@@ -362,6 +363,8 @@ ascc_status ascc_step_once(ascc_step *step, ascc_particles *p, const ascc_motion
     if (status == ASCC_OK)
         status =
             ascc_integrate_end(tools->workers, p, motion, impulses->fluid, advance, &step->message);
+    if (status == ASCC_OK && p->fluid_count && step->model->plan.output.walls.contact > 0.0)
+        status = ascc_contact(&trace->run, p, motion->time_step, step->length_unit, advance, impulses);
     if (status != ASCC_OK)
         return status;
     commit(step, p, advance, impulses);

@@ -72,6 +72,10 @@ static void test_every_variant_loads(void **state)
                     }
                     a.advected = (variant & 4) != 0;
                     a.order = variant & 4 ? 2 : 1;
+                    if (kernel == ASCC_FAMILY_BASIS && (variant & 3) == 1) {
+                        a.impulse_limit = 0.15;
+                        a.contact = 0.4;
+                    }
                     for (int sampling = 0; sampling < 3; sampling++) {
                         a.sampling = (ascc_sampling)sampling;
                         loads(context, &a);
@@ -184,6 +188,18 @@ static void test_numbers_that_do_not_fit_are_refused_by_name(void **state)
     a = basis;
     a.output = ASCC_OUTPUT_PLAIN;
     refused(&a, "damping");
+    a.damping = false;
+    a.contact = 0.4;
+    refused(&a, "contact");
+    a = basis;
+    a.contact = 1.01 * a.wall_radius;
+    refused(&a, "contact");
+    a = basis;
+    a.impulse_limit = -1.0;
+    refused(&a, "impulse_limit");
+    a = grid;
+    a.contact = 0.4;
+    refused(&a, "contact");
     a = grid;
     a.damping = true;
     refused(&a, "damping");

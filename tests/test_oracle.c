@@ -241,6 +241,7 @@ static void motion_and_its_damping_equal_doubles(void **state)
                                      .damping = v / 3 % 2,
                                      .walls = v / 5 % 2,
                                      .direction = v / 7 % 2,
+                                     .limit = v % 4 == 1 ? 2e-4 : 0.0,
                                      .evaluate = v % 3 ? "advected" : "current"};
         worst = fmax(worst, check("motion", v, &random));
     }

@@ -21,6 +21,7 @@ typedef struct world_options {
     int32_t dimension, threads, neighbor_limit;
     uint32_t cpu_disable;
     bool radial, walls, unequal, random_network;
+    bool gravity;               /* the random network sees it */
     const char *method;         /* of sampling; NULL = voxel centres */
     int bumps, order, transfer; /* of the random network: see model_random */
     const char *type;           /* of its weights, all of which every type holds */
@@ -55,6 +56,7 @@ static ascc_model *make_model(ascc_context *context, const world_options *o)
                                 .no_hysteresis = 1,
                                 .type = o->type,
                                 .coarse = o->type != NULL,
+                                .gravity = o->gravity,
                                 .neighbor_limit = o->neighbor_limit};
         bytes = model_builder_random(&r, &size);
     } else {
@@ -548,6 +550,23 @@ static void a_host_in_centimetres_gets_the_same_motion(void **state)
     close_world(&b);
 }
 
+static void gravity_is_seen_alike_in_every_unit(void **state)
+{
+    (void)state;
+    const world_options metres = {
+        .dimension = 3, .threads = 1, .random_network = true, .gravity = true};
+    world_options centimetres = metres;
+    centimetres.unit = 0.01;
+    world a = open_world(&metres), b = open_world(&centimetres);
+    const double down_cm[3] = {0.0, -981.0, 0.0};
+    run(&a, down, 3);
+    run(&b, down_cm, 3);
+    for (size_t k = 0; k < ascc_particles_count(a.particles, ASCC_FLUID) * 3; k++)
+        assert_true(fabs(a.particles->position[k] - b.particles->position[k] * 0.01) < 1e-8);
+    close_world(&a);
+    close_world(&b);
+}
+
 static void the_models_gravity_is_the_default_in_the_hosts_unit(void **state)
 {
     (void)state;
@@ -988,6 +1007,163 @@ static void measures_of_a_lattice_at_rest_are_those_of_rest(void **state)
     close_world(&w);
 }
 
+/* ---- Contact with walls ---- */
+
+#define ROOM 5 /* spacings along each edge */
+#define SHOTS 40
+
+typedef struct room {
+    world w;
+    size_t d;
+    double unit, contact; /* metres in the host's length; spacings */
+} room;
+
+/* A closed room, walls 0.8 spacings apart, of which particles fly at up to 1.5 spacings a step, and what a
+ * random network does to them. */
+static room open_room(int32_t dimension, double contact, int32_t threads, double unit)
+{
+    room r = {.d = (size_t)dimension, .unit = unit, .contact = contact};
+    const model_random random = {.seed = 9,
+                                 .dimension = dimension,
+                                 .channels = 8,
+                                 .spacing = spacing,
+                                 .scale = 0.003,
+                                 .bumps = 3,
+                                 .order = 1,
+                                 .fluid_only = 1,
+                                 .walls = 1,
+                                 .contact = contact};
+    const ascc_context_options context = {.size = sizeof context, .thread_count = threads};
+    const ascc_particles_options options = {.size = sizeof options,
+                                            .dimension = dimension,
+                                            .spacing = spacing / unit,
+                                            .mass = 0.125};
+    const ascc_step_options step = {.size = sizeof step, .length_unit = unit};
+    double x[1200 * 3], v[1200 * 3];
+    dice random_numbers = {77};
+    size_t size;
+    unsigned char *bytes = model_builder_random(&random, &size);
+    assert_int_equal(ascc_context_create(&context, &r.w.context), ASCC_OK);
+    assert_int_equal(ascc_model_load_memory(r.w.context, bytes, size, &r.w.model), ASCC_OK);
+    free(bytes);
+    assert_int_equal(ascc_particles_create(r.w.context, &options, &r.w.particles), ASCC_OK);
+    for (size_t k = 0; k < SHOTS * r.d; k++) {
+        x[k] = dice_uniform(&random_numbers, 1.0, ROOM - 1.0) * spacing / unit;
+        v[k] = dice_uniform(&random_numbers, -1.5, 1.5) * spacing / 0.005 / unit;
+    }
+    const ascc_const_array position = {.data = x, .scalar = ASCC_DOUBLE};
+    const ascc_const_array velocity = {.data = v, .scalar = ASCC_DOUBLE};
+    assert_int_equal(ascc_particles_add_fluid(r.w.particles, SHOTS, &position, &velocity, NULL, NULL),
+                     ASCC_OK);
+    size_t n = 0;
+    const int side = (int)(ROOM / 0.8) + 1;
+    for (size_t face = 0; face < 2 * r.d; face++)
+        for (int j = 0; j < (r.d == 2 ? 1 : side); j++)
+            for (int i = 0; i < side; i++, n++) {
+                const size_t axis = face / 2;
+                for (size_t c = 0; c < r.d; c++) {
+                    x[n * r.d + c] = (c == (axis + 1) % r.d ? i : j) * 0.8 * spacing / unit;
+                    v[n * r.d + c] = 0.0;
+                }
+                x[n * r.d + axis] = face % 2 ? ROOM * spacing / unit : 0.0;
+                v[n * r.d + axis] = face % 2 ? -1.0 : 1.0;
+            }
+    assert_int_equal(ascc_particles_add_boundary(r.w.particles, n, &position, &velocity, 0, NULL),
+                     ASCC_OK);
+    assert_int_equal(ascc_step_create(r.w.context, r.w.model, &step, &r.w.step), ASCC_OK);
+    return r;
+}
+
+/* The closest that a particle is to a wall, or the farthest beyond it (negative), in spacings. */
+static double closest(const room *r)
+{
+    double least = ROOM;
+    for (size_t k = 0; k < SHOTS * r->d; k++) {
+        const double at = r->w.particles->position[k] * r->unit / spacing;
+        least = fmin(least, fmin(at, ROOM - at));
+    }
+    return least;
+}
+
+static void nothing_passes_a_wall_with_contact(void **state)
+{
+    (void)state;
+    for (int32_t dimension = 2; dimension <= 3; dimension++) {
+        const double gravity[3] = {0.0, -9.81, 0.0};
+        room with = open_room(dimension, 0.4, 1, 1.0), without = open_room(dimension, 0.0, 1, 1.0);
+        int hits = 0;
+        for (int n = 0; n < 60; n++) {
+            run(&with.w, gravity, 1);
+            run(&without.w, gravity, 1);
+            const ascc_step_statistics s = statistics_of(&with.w);
+            for (size_t c = 0; c < with.d; c++) {
+                assert_true(s.momentum_before[c] + s.external_impulse[c] - s.wall_impulse[c] ==
+                            s.momentum_after[c]);
+                hits += s.wall_impulse[c] != 0;
+            }
+            assert_true(closest(&with) > 0.4 - 1e-6);
+        }
+        assert_true(hits > 30);
+        assert_true(closest(&without) < -0.5); /* so there was something to hold */
+        close_world(&with.w);
+        close_world(&without.w);
+    }
+}
+
+static void contact_gives_the_same_bits_for_any_number_of_threads(void **state)
+{
+    (void)state;
+    const double gravity[3] = {1.0, -9.81, 2.0};
+    room one = open_room(3, 0.4, 1, 1.0), four = open_room(3, 0.4, 4, 1.0);
+    run(&one.w, gravity, 40);
+    run(&four.w, gravity, 40);
+    assert_true(ascc_particles_hash(one.w.particles) == ascc_particles_hash(four.w.particles));
+    for (size_t k = 0; k < one.w.particles->boundary_count * 3; k++)
+        assert_true(one.w.particles->wall_impulse[k] == four.w.particles->wall_impulse[k]);
+    close_world(&one.w);
+    close_world(&four.w);
+}
+
+static void contact_holds_alike_in_every_unit(void **state)
+{
+    (void)state;
+    const double down_cm[3] = {0.0, -981.0, 0.0};
+    room metres = open_room(2, 0.4, 1, 1.0), centimetres = open_room(2, 0.4, 1, 0.01);
+    run(&metres.w, down, 3);
+    run(&centimetres.w, down_cm, 3);
+    for (size_t k = 0; k < SHOTS * 2; k++)
+        assert_true(fabs(metres.w.particles->position[k] -
+                         centimetres.w.particles->position[k] * 0.01) < 1e-7);
+    assert_true(closest(&metres) < 0.41); /* something was held */
+    close_world(&metres.w);
+    close_world(&centimetres.w);
+}
+
+static void contact_takes_what_points_into_the_wall_and_nothing_else(void **state)
+{
+    (void)state;
+    room r = open_room(2, 0.4, 1, 1.0);
+    const double v = 0.5 * spacing / 0.005; /* half a spacing a step */
+    for (size_t i = 0; i < SHOTS; i++) {    /* one is near the wall x = 0, the others rest far away */
+        const double x[2] = {i ? 2.5 * spacing + 100.0 * (double)i : 0.6 * spacing, 2.4 * spacing};
+        for (size_t c = 0; c < 2; c++) {
+            r.w.particles->position[i * 2 + c] = x[c];
+            (void)ascc_to_quanta(i ? 0.0 : 0.125 * (c ? v : -v), r.w.particles->quantum,
+                                 &r.w.particles->momentum[i * 2 + c]);
+        }
+    }
+    room free = open_room(2, 0.0, 1, 1.0);
+    memcpy(free.w.particles->position, r.w.particles->position, SHOTS * 2 * sizeof(double));
+    memcpy(free.w.particles->momentum, r.w.particles->momentum, SHOTS * 2 * sizeof(int64_t));
+    run(&r.w, no_gravity, 1);
+    run(&free.w, no_gravity, 1);
+    assert_true(free.w.particles->position[0] < 0.3 * spacing);
+    assert_true(fabs(r.w.particles->position[0] - 0.4 * spacing) < 1e-9);
+    assert_true(fabs(r.w.particles->position[1] - free.w.particles->position[1]) < 1e-9);
+    close_world(&r.w);
+    close_world(&free.w);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -1005,6 +1181,11 @@ int main(void)
         cmocka_unit_test(many_steps_at_once_equal_single_steps),
         cmocka_unit_test(a_restored_run_goes_on_bit_for_bit),
         cmocka_unit_test(a_host_in_centimetres_gets_the_same_motion),
+        cmocka_unit_test(gravity_is_seen_alike_in_every_unit),
+        cmocka_unit_test(nothing_passes_a_wall_with_contact),
+        cmocka_unit_test(contact_gives_the_same_bits_for_any_number_of_threads),
+        cmocka_unit_test(contact_holds_alike_in_every_unit),
+        cmocka_unit_test(contact_takes_what_points_into_the_wall_and_nothing_else),
         cmocka_unit_test(the_models_gravity_is_the_default_in_the_hosts_unit),
         cmocka_unit_test(free_fall_follows_gravity_and_acceleration),
         cmocka_unit_test(bad_forces_are_refused),

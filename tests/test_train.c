@@ -390,6 +390,7 @@ static void gradients_of_motion_and_damping_are_right(void **state)
         c.random.damping = v / 2 % 2;
         c.random.walls = v / 8 % 2;
         c.random.direction = v / 3 % 2;
+        c.random.limit = v % 4 == 2 ? 1e-3 : 0.0;
         c.random.evaluate = v % 5 ? "advected" : "current";
         c.horizon = 1 + v / 3 % 2;
         worst = fmax(worst, check_gradient(&c));

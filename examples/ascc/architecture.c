@@ -563,9 +563,13 @@ static void central_output(writer *w, const char *last)
         last, SCALE * a->spacing,
         (a->output_radius > 0.0 ? a->output_radius : a->radius) * a->spacing, a->output_bumps);
     output_kernels(w, "output", a->output_bumps);
+    if (a->impulse_limit > 0.0)
+        add(&w->network, ",\"limit\":%.9g", a->impulse_limit * a->spacing);
     add(&w->network, ",\"walls\":{\"radius\":%.9g,\"basis\":{\"bumps\":%d},",
         a->wall_radius * a->spacing, a->wall_bumps);
     output_kernels(w, "output.walls", a->wall_bumps);
+    if (a->contact > 0.0)
+        add(&w->network, ",\"contact\":%.9g", a->contact * a->spacing);
     add(&w->network, "}%s}", a->advected && !a->seen_direction ? ",\"direction\":\"current\"" : "");
 }
 
@@ -822,6 +826,12 @@ static const char *basis_fault(const ascc_architecture *a)
         return "projection is for kernel grid: a basis is central by itself";
     if (a->damping && a->output == ASCC_OUTPUT_PLAIN)
         return "damping needs output antisymmetric";
+    if (!(a->contact >= 0.0) || a->contact > a->wall_radius)
+        return "contact is within 0 and wall_radius";
+    if (!(a->impulse_limit >= 0.0) || a->impulse_limit > 1e6)
+        return "impulse_limit is within 0 and 1e6";
+    if ((a->contact > 0.0 || a->impulse_limit > 0.0) && a->output == ASCC_OUTPUT_PLAIN)
+        return "contact and impulse_limit need output antisymmetric";
     return NULL;
 }
 
@@ -829,8 +839,8 @@ static const char *grid_fault(const ascc_architecture *a)
 {
     if (a->damping)
         return "damping needs kernel basis";
-    if (a->gravity_seen)
-        return "gravity_seen needs kernel basis";
+    if (a->gravity_seen || a->contact != 0.0 || a->impulse_limit != 0.0)
+        return "gravity_seen, contact and impulse_limit need kernel basis";
     if (a->channels < 4)
         return "kernel grid takes at least 4 channels";
     if (a->levels > APART * ((a->fine_layers - 1) / 2))

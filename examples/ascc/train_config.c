@@ -214,6 +214,8 @@ static void read_network(reading *g, uint32_t root, int32_t seed, ascc_architect
     a->output_radius = number_or(r, o, "output_radius", 0.0, 100.0, a->output_radius);
     a->output_bumps = integer_or(r, o, "output_bumps", 1, ASCC_MAX_BUMPS, a->output_bumps);
     a->gravity_seen = flag_or(r, o, "gravity_seen", false);
+    a->impulse_limit = number_or(r, o, "impulse_limit", 0.0, 1e6, 0.0);
+    a->contact = number_or(r, o, "contact", 0.0, 100.0, 0.0);
     a->seen_direction =
         choice_or(r, o, "direction", ascc_architecture_directions, 2, a->seen_direction) == 1;
     a->output = (ascc_output_kind)choice_or(r, o, "output", ascc_architecture_outputs, 2,

@@ -105,6 +105,8 @@ typedef struct pair {
     double slope, damping_slope; /* of strength and damping by distance over radius */
     double force[3], relative[3]; /* gradient of the impulse; motion of i less that of j */
     double along;                /* force . u */
+    double total;                /* the impulse along u, limited */
+    bool limited;                /* then nothing but u changes it */
 } pair;
 
 /* Gradients by r (seen) and d (the line), added to the positions'. */
@@ -119,8 +121,7 @@ static void pass_places(const pairs_pass *q, const pair *a, const ascc_filter *f
         a->along * (a->cosine * a->slope - a->damping_slope * a->approach) / filter->radius;
     double by_u[3], by_seen[3], seen_i[3], seen_j[3], turned = 0.0, seen_turned = 0.0;
     for (size_t c = 0; c < 3; c++) {
-        by_u[c] = a->force[c] * (a->cosine * a->strength - a->damping * a->approach) -
-                  a->damping * a->along * a->relative[c] + (before ? by_cosine * a->seen[c] : 0.0);
+        by_u[c] = a->force[c] * a->total - a->damping * a->along * a->relative[c] + (before ? by_cosine * a->seen[c] : 0.0);
         by_seen[c] = before ? by_cosine * a->u[c] : 0.0;
         turned += by_u[c] * a->u[c];
         seen_turned += by_seen[c] * a->seen[c];
@@ -165,6 +166,13 @@ static void find_pair(const pairs_pass *q, int part, const bumps_at *at, const d
                              (a->both ? (double)motion[a->j * width + (size_t)c] : 0.0);
         a->approach = dot3(a->relative, a->u);
     }
+    const double limit = ascc_output_limit(&plan->output);
+    a->total = a->cosine * a->strength - a->damping * a->approach;
+    a->limited = fabs(a->total) > limit;
+    if (a->limited) {
+        a->total = a->total > 0.0 ? limit : -limit;
+        a->strength = a->slope = a->damping = a->damping_slope = 0.0;
+    }
 }
 
 /* One pair: line d from i to j, displacement r seen; parts `part` (strength) and part + 1 (damping). */
@@ -178,7 +186,7 @@ static void pass_pair(const pairs_pass *q, int part, const ascc_filter *filter, 
         return;
     const bumps_at at = find_bumps(a.distance / filter->radius, filter->bumps);
     find_pair(q, part, &at, r, d, &a);
-    for (int side = 0; side < (both ? 2 : 1); side++) {
+    for (int side = 0; side < (both ? 2 : 1) && !a.limited; side++) {
         add_share(q, part, side ? j : i, &at, a.cosine * a.along);
         add_share(q, part + 1, side ? j : i, &at, -a.approach * a.along);
     }

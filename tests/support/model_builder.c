@@ -425,6 +425,8 @@ static void add_central(random_network *n)
     const double amplitude = o->gain / sqrt((double)o->channels);
     if (o->direction)
         model_text_add(&n->text, ",\"direction\":\"current\"");
+    if (o->limit > 0.0)
+        model_text_add(&n->text, ",\"limit\":%s", model_number(o->limit * o->spacing));
     if (o->damping) {
         model_text_add(&n->text, ",\"damping\":\"output.damping\"");
         add_pairs(&n->builder, &n->state, "output.damping", o->bumps, o->channels, amplitude, 1);
@@ -435,6 +437,8 @@ static void add_central(random_network *n)
                    ",\"walls\":{\"kernel\":\"walls.kernel\",\"radius\":%s,\"basis\":{\"bumps\":%d}",
                    model_number(1.3 * o->radius * o->spacing), o->bumps + 1);
     add_pairs(&n->builder, &n->state, "walls.kernel", o->bumps + 1, o->channels, amplitude, 0);
+    if (o->contact > 0.0)
+        model_text_add(&n->text, ",\"contact\":%s", model_number(o->contact * o->spacing));
     if (o->damping) {
         model_text_add(&n->text, ",\"damping\":\"walls.damping\"");
         add_pairs(&n->builder, &n->state, "walls.damping", o->bumps + 1, o->channels, amplitude, 1);

@@ -81,6 +81,8 @@ typedef struct model_random {
     int relative; /* 1: convolutions of features see motion relative to the query's; fluid_only */
     int damping;  /* 1: of the last layer's pairs, and of its walls'; bumps, fluid_only, motion */
     int walls;    /* 1: the last layer acts on walls, with one bump more; bumps, fluid_only */
+    double limit;   /* of what a pair gives, spacings; bumps; 0 = none */
+    double contact; /* with walls, spacings; 0 = none */
     int direction; /* 1: the last layer's pairs act along their present line; bumps, fluid_only */
 } model_random;
 

@@ -658,8 +658,11 @@ static void central_pair(const network_state *n, const ascc_filter *filter, cons
         approach += (motion_of(n, i, c) - (wall_at ? 0.0 : motion_of(n, j, c))) * line[c] / across;
     if (damping)
         strength -= strength_of(n, filter, damping, f, length) * approach;
+    double given = plan->output.scale[0] * strength;
+    if (plan->output.limit > 0.0)
+        given = fmax(-plan->output.limit, fmin(plan->output.limit, given));
     for (int c = 0; c < plan->dimension; c++)
-        correction[c] += plan->output.scale[0] * strength * line[c] / across;
+        correction[c] += given * line[c] / across;
 }
 
 static void correct_particle(const network_state *n, size_t i, double *correction)

@@ -1,0 +1,165 @@
+/* Walls that nothing passes, as contact.h draws it. SPDX-License-Identifier: MIT */
+#include "contact.h"
+
+#include <inttypes.h>
+#include <math.h>
+
+/* Walls that one particle may meet in a step, one after the other: three make a corner. */
+#define MEETINGS 4
+/* Of a disc, in spacings: discs on a square lattice one spacing apart leave no gap. */
+#define DISC 0.71
+/* A particle this much closer than the contact distance, in spacings, is still held there. */
+#define SLACK 0.25
+/* Depths below this, in spacings, are rounding. */
+#define NOTHING 1e-9
+/* Where a wall's sum of impulses is called full: one more particle cannot overflow it. */
+#define WALL_LIMIT ((int64_t)1 << 62)
+
+typedef struct contact_job {
+    const ascc_network_run *run;
+    const ascc_rows *rows; /* walls around the fluid */
+    const ascc_particles *p;
+    double time_step, distance, disc_square, slack, nothing;
+    ascc_advance *advance;
+    int64_t *wall;
+    atomic_size_t bad; /* 1 + first set row that fails */
+} contact_job;
+
+typedef struct meeting {
+    double when; /* share of the way, > 1 = none */
+    size_t wall; /* host's boundary row */
+    double push; /* along its normal, at the end of the way */
+} meeting;
+
+static size_t wall_of(const contact_job *job, uint32_t neighbor)
+{
+    const ascc_hierarchy *h = job->run->hierarchy;
+    return h->origin[h->whole[ASCC_SET_BOUNDARY][neighbor]] - h->fluid_count;
+}
+
+/* Where the way from `from` to `to` meets this wall; meeting.when > 1 if it does not. */
+static meeting meet(const contact_job *job, size_t wall, const double *from, const double *to)
+{
+    const size_t d = (size_t)job->p->dimension;
+    const double *w = job->p->wall_position + wall * d, *n = job->p->wall_normal + wall * d;
+    meeting m = {2.0, wall, 0.0};
+    double begin = 0.0, end = 0.0, square = 0.0, along = 0.0;
+    for (size_t c = 0; c < d; c++) {
+        begin += (from[c] - w[c]) * n[c];
+        end += (to[c] - w[c]) * n[c];
+    }
+    if (!(end < job->distance - job->nothing && end < begin - job->nothing &&
+          begin > job->distance - job->slack))
+        return m;
+    const double when = begin > job->distance ? (begin - job->distance) / (begin - end) : 0.0;
+    for (size_t c = 0; c < d; c++) {
+        const double at = from[c] + when * (to[c] - from[c]) - w[c];
+        square += at * at;
+        along += at * n[c];
+    }
+    if (square - along * along > job->disc_square)
+        return m;
+    m.when = when;
+    m.push = (begin < job->distance ? begin : job->distance) - end;
+    return m;
+}
+
+/* The first wall on the way; of walls met at once the one that pushes most, then that of the lowest row. */
+static meeting first_meeting(const contact_job *job, size_t i, const double *from, const double *to)
+{
+    const uint32_t *neighbor = job->rows->neighbor + job->rows->start[i];
+    meeting first = {2.0, 0, 0.0};
+    for (size_t k = 0; k < job->rows->count[i]; k++) {
+        const meeting m = meet(job, wall_of(job, neighbor[k]), from, to);
+        if (m.when < first.when ||
+            (m.when <= 1.0 && m.when == first.when &&
+             (m.push > first.push || (m.push == first.push && m.wall < first.wall))))
+            first = m;
+    }
+    return first;
+}
+
+/* Momentum that takes the particle from its place to `to` in a step; the wall has the rest. */
+static bool end_at(contact_job *job, size_t row, size_t wall, const double *to)
+{
+    const ascc_particles *p = job->p;
+    const size_t d = (size_t)p->dimension;
+    for (size_t c = 0; c < d; c++) {
+        const size_t k = row * d + c;
+        const double velocity = (to[c] - p->position[k]) / job->time_step;
+        int64_t momentum;
+        if (!ascc_to_quanta(p->mass[row] * velocity, p->quantum, &momentum) ||
+            momentum > ASCC_MOMENTUM_LIMIT || momentum < -ASCC_MOMENTUM_LIMIT)
+            return false;
+        const int64_t before = __atomic_fetch_add(
+            &job->wall[wall * d + c], job->advance->momentum[k] - momentum, __ATOMIC_RELAXED);
+        if (before >= WALL_LIMIT || before <= -WALL_LIMIT)
+            return false;
+        job->advance->momentum[k] = momentum;
+        job->advance->position[k] =
+            p->position[k] +
+            job->time_step * ((double)momentum * p->quantum / p->mass[row]);
+    }
+    return true;
+}
+
+static bool hold_row(contact_job *job, size_t i)
+{
+    const size_t d = (size_t)job->p->dimension;
+    const ascc_hierarchy *h = job->run->hierarchy;
+    const size_t row = ascc_hierarchy_host_row(h, ASCC_SET_FLUID, i);
+    double from[3], to[3];
+    for (size_t c = 0; c < d; c++) {
+        from[c] = job->p->position[row * d + c];
+        to[c] = job->advance->position[row * d + c];
+    }
+    for (int n = 0; n < MEETINGS; n++) {
+        const meeting m = first_meeting(job, i, from, to);
+        if (m.when > 1.0)
+            break;
+        const double *normal = job->p->wall_normal + m.wall * d;
+        for (size_t c = 0; c < d; c++) {
+            from[c] += m.when * (to[c] - from[c]);
+            to[c] = n + 1 < MEETINGS ? to[c] + m.push * normal[c] : from[c];
+        }
+        if (!end_at(job, row, m.wall, to))
+            return false;
+    }
+    return true;
+}
+
+static void hold_rows(void *data, size_t begin, size_t end, int32_t slot)
+{
+    (void)slot;
+    contact_job *job = data;
+    for (size_t i = begin; i < end; i++)
+        if (job->rows->count[i] && !hold_row(job, i)) {
+            ascc_note_first(&job->bad, i);
+            return;
+        }
+}
+
+ascc_status ascc_contact(const ascc_network_run *run, const ascc_particles *p, double time_step,
+                         double unit, ascc_advance *advance, const ascc_impulses *impulses)
+{
+    const ascc_plan *plan = run->network->plan;
+    const double spacing = plan->spacing / unit;
+    contact_job job = {.run = run,
+                       .rows = &run->rows[run->network->wall_key],
+                       .p = p,
+                       .time_step = time_step,
+                       .distance = plan->output.walls.contact / unit,
+                       .disc_square = DISC * DISC * spacing * spacing,
+                       .slack = SLACK * spacing,
+                       .nothing = NOTHING * spacing,
+                       .advance = advance,
+                       .wall = impulses->wall};
+    ascc_workers_run(run->tools->workers, run->hierarchy->set[ASCC_SET_FLUID].count, 256, hold_rows,
+                     &job);
+    const size_t bad = atomic_load(&job.bad);
+    if (bad)
+        return ascc_fail(run->tools->message, ASCC_ERROR_RANGE,
+                         "fluid row %zu: a wall gives it a momentum too large to hold",
+                         ascc_hierarchy_host_row(run->hierarchy, ASCC_SET_FLUID, bad - 1));
+    return ASCC_OK;
+}
