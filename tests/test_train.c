@@ -680,6 +680,27 @@ static void weights_that_compute_nothing_are_taken_back(void **state)
     free(m);
 }
 
+static void twenty_iterations_without_a_gradient_stop_training(void **state)
+{
+    (void)state;
+    const model_random random = small(25, 2);
+    ascc_trainer_options o = default_options();
+    motion *m = make_motion(9, 2);
+    ascc_trainer *trainer = open_trainer(&o, &random, m);
+    float *nothing = calloc(ascc_trainer_parameter_count(trainer), sizeof *nothing);
+    assert_non_null(nothing);
+    assert_int_equal(ascc_trainer_set_parameters(trainer, nothing), ASCC_OK);
+    ascc_training_report report = {.size = sizeof report};
+    for (int i = 0; i < 19; i++)
+        assert_int_equal(ascc_trainer_iterate(trainer, &report), ASCC_OK);
+    assert_true(report.loss > 0.0 && report.gradient_norm == 0.0);
+    assert_int_equal(ascc_trainer_iterate(trainer, &report), ASCC_ERROR_RANGE);
+    assert_non_null(strstr(ascc_trainer_message(trainer), "exactly 0"));
+    free(nothing);
+    ascc_trainer_destroy(&trainer);
+    free(m);
+}
+
 /* The weights after five iterations with so many steps before. */
 static float *learned_with(int32_t presteps, double truth_share, size_t *count)
 {
@@ -860,6 +881,7 @@ int main(void)
         cmocka_unit_test(a_sequence_of_another_time_step_or_too_short_is_refused),
         cmocka_unit_test(a_rollout_that_blows_up_leaves_the_weights_alone),
         cmocka_unit_test(weights_that_compute_nothing_are_taken_back),
+        cmocka_unit_test(twenty_iterations_without_a_gradient_stop_training),
         cmocka_unit_test(the_share_of_true_states_takes_no_steps_before),
         cmocka_unit_test(training_lowers_the_loss),
         cmocka_unit_test(augmentation_turns_the_whole_world),

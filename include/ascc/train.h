@@ -100,7 +100,8 @@ ASCC_API ascc_status ascc_trainer_add_sequence(ascc_trainer *trainer,
  * errors: ARGUMENT (no sequence long enough), MEMORY, NOT_FINITE (a loss or gradient that is not finite:
  * weights and optimiser stay as they were; or the twentieth iteration in a row of which no rollout could be
  * computed: weights, optimiser and iteration are again what they were before the last change of weights;
- * the message names sequence and frame).
+ * the message names sequence and frame), RANGE (the twentieth iteration in a row with a gradient of exactly 0:
+ * all channels of a layer are off for good).
  */
 ASCC_API ascc_status ascc_trainer_iterate(ascc_trainer *trainer, ascc_training_report *report);
 

@@ -117,7 +117,7 @@ static ascc_status read_state(ascc_trainer *t, const char *path, ascc_safetensor
                t->parameter_count * sizeof(float));
     t->iteration = strtoull(iteration, NULL, 10);
     t->changed = false;
-    t->in_vain = 0;
+    t->in_vain = t->deaf = 0;
     ascc_trainer_apply(t);
     return ASCC_OK;
 }

@@ -606,6 +606,19 @@ static ascc_status count_in_vain(ascc_trainer *t)
                 task->sequence->name, frame, IN_VAIN - 1, t->iteration);
 }
 
+/* Where all channels of a layer are negative for every particle, nothing behind them is heard of again. */
+static ascc_status count_deaf(ascc_trainer *t, const ascc_training_report *report)
+{
+    t->deaf = report->gradient_norm == 0.0 && report->loss > 0.0 ? t->deaf + 1 : 0;
+    if (t->deaf < IN_VAIN)
+        return ASCC_OK;
+    t->deaf = 0;
+    return FAIL(ASCC_ERROR_RANGE,
+                "the gradient was exactly 0 in the last %d iterations: all channels of a layer are off for "
+                "good; go on from an earlier model, with a smaller learning rate",
+                IN_VAIN);
+}
+
 ascc_status ascc_trainer_iterate(ascc_trainer *t, ascc_training_report *report)
 {
     ascc_training_report own = {0};
@@ -629,8 +642,7 @@ ascc_status ascc_trainer_iterate(ascc_trainer *t, ascc_training_report *report)
         if (own.skipped < t->batch)
             learn(t, &own);
         t->iteration++;
-        if (own.skipped == t->batch)
-            status = count_in_vain(t);
+        status = own.skipped == t->batch ? count_in_vain(t) : count_deaf(t, &own);
     }
     own.iteration = t->iteration;
     own.seconds = now() - begin;

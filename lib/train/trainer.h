@@ -48,6 +48,7 @@ struct ascc_trainer {
     float *before;            /* the same four before the weights last changed */
     uint64_t before_iteration;
     int32_t in_vain;          /* iterations of late without any rollout */
+    int32_t deaf;             /* iterations of late without any gradient */
     bool changed;             /* there is a before */
     ascc_message message;
 };
