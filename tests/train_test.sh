@@ -98,7 +98,7 @@ wrong "network: 'dimension' is 4" 's/"dimension": 2/"dimension": 4/'
 wrong "network: 'kernel' does not understand 'mesh'" 's/"channels": 4,/"kernel": "mesh",/'
 wrong "contact is within 0 and wall_radius" 's/"channels": 4,/"contact": 9,/'
 wrong "projection is for kernel grid" 's/"channels": 4,/"projection": "radial",/'
-wrong "either 'network' or 'model' is wanted" 's/"batch": 2/"model": "m.safetensors"/'
+wrong "'network' or 'model' is wanted" 's/"network"/"networks"/'
 wrong "stage 2: 'horizon' is 0" 's/"horizon": 2/"horizon": 0/'
 wrong "stage 1: unknown key 'rate'" 's/"learning_rate_end"/"rate"/'
 wrong "data: train: *_0009.safetensors: there is no such file" 's|data/[*]_0000|*_0009|'
@@ -130,6 +130,17 @@ report $? 'a run that is done is resumed in vain'
 mkdir -p empty
 PATH=$folder/empty run train whole.json --resume
 holds 'without gnuplot a line says so' grep -q 'no chart: gnuplot' out
+
+# ---- Weights of another model ----
+
+config other.json other 's|"batch"|"model": "whole/m.safetensors", "batch"|;s/"channels": 4,/"channels": 4, "contact": 0.4,/;s/"iterations": [0-9]*/"iterations": 1/g;s/"learning_rate": [0-9.e-]*/"learning_rate": 1e-30/g;s/"learning_rate_end": [0-9.e-]*/"learning_rate_end": 1e-30/g'
+run train other.json --threads 1
+report $? 'a network begins with the weights of a model'
+"$ascc" info whole/m.safetensors >one
+holds 'with another contact it has the same weights' sh -c '
+    tail -c 512 whole/m.safetensors >a; tail -c 512 other/m-latest.safetensors >b; cmp a b; grep -q contact other/m.safetensors'
+config shape.json shape 's|"batch"|"model": "whole/m.safetensors", "batch"|;s/"coarse_channels": .4./"coarse_channels": [8]/'
+refuses 1 "of the network is not there, or of another shape" train shape.json
 
 # ---- Interrupted, in every way, the result is the same ----
 

@@ -24,6 +24,7 @@
 #include "progress.h"
 #include "sequence.h"
 #include "train_config.h"
+#include "safetensors.h"
 #include "train_log.h"
 
 typedef struct training {
@@ -369,16 +370,67 @@ static bool run(training *t)
 
 /* ---- From config to trainer ----------------------------------------------------------------------- */
 
+/* Gives the tensors of one model file the numbers of another's of the same names and shapes. */
+static bool copy_weights(training *t, const unsigned char *from, size_t from_size, unsigned char *to,
+                         size_t to_size)
+{
+    const ascc_allocator allocator = ascc_allocator_default();
+    ascc_safetensors source, target;
+    ascc_message why = {""};
+    if (ascc_safetensors_open(&allocator, from, from_size, &source, &why) != ASCC_OK)
+        return fail(t, t->config.model, why.text);
+    bool good = ascc_safetensors_open(&allocator, to, to_size, &target, &why) == ASCC_OK;
+    for (size_t i = 0; good && i < target.tensor_count; i++) {
+        const ascc_tensor *own = &target.tensor[i];
+        const int32_t k = ascc_safetensors_find(&source, own->name);
+        const ascc_tensor *other = k < 0 ? NULL : &source.tensor[k];
+        good = other && strcmp(other->type, own->type) == 0 && other->rank == own->rank &&
+               memcmp(other->shape, own->shape, (size_t)own->rank * sizeof *own->shape) == 0;
+        if (good)
+            memcpy(to + (own->data - to), other->data, own->count * own->element_size);
+        else
+            (void)snprintf(why.text, sizeof why.text,
+                           "tensor '%s' of the network is not there, or of another shape or type",
+                           own->name);
+    }
+    if (!good)
+        (void)fail(t, t->config.model, why.text);
+    if (target.tensor)
+        ascc_safetensors_close(&target);
+    ascc_safetensors_close(&source);
+    return good;
+}
+
+/* The model file that training begins with; NULL after fail. */
+static unsigned char *first_model(training *t, size_t *size)
+{
+    const ascc_train_config *c = &t->config;
+    char why[256] = "";
+    size_t given_size;
+    unsigned char *given = c->model[0] ? read_whole(t, c->model, &given_size) : NULL;
+    if (c->model[0] && (!given || !c->described)) {
+        *size = given_size;
+        return given;
+    }
+    unsigned char *made = ascc_architecture_build(&c->architecture, size, why, sizeof why);
+    if (!made)
+        (void)fail(t, "network", why);
+    if (made && given && !copy_weights(t, given, given_size, made, *size)) {
+        free(made);
+        made = NULL;
+    }
+    free(given);
+    return made;
+}
+
 static bool create_trainer(training *t)
 {
     ascc_train_config *c = &t->config;
     char why[256] = "";
     size_t size;
-    unsigned char *bytes = c->model[0]
-                               ? read_whole(t, c->model, &size)
-                               : ascc_architecture_build(&c->architecture, &size, why, sizeof why);
+    unsigned char *bytes = first_model(t, &size);
     if (!bytes)
-        return c->model[0] ? false : fail(t, "network", why);
+        return false;
     c->options.thread_count = t->threads;
     c->options.message = why;
     c->options.message_size = sizeof why;

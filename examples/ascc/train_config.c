@@ -335,11 +335,12 @@ static void read_all(reading *g, ascc_train_config *c)
     if (r->json->value[0].kind != ASCC_JSON_OBJECT)
         ascc_reader_fail(r, "not an object");
     read_options(g, 0, &c->options);
-    if (ascc_reader_has(r, 0, "model") == ascc_reader_has(r, 0, "network"))
-        ascc_reader_fail(r, "either 'network' or 'model' is wanted");
+    c->described = ascc_reader_has(r, 0, "network");
     if (ascc_reader_has(r, 0, "model"))
         path_of(g, 0, "model", c->model);
-    else
+    else if (!c->described)
+        ascc_reader_fail(r, "'network' or 'model' is wanted");
+    if (c->described)
         read_network(g, 0, (int32_t)c->options.seed, &c->architecture);
     read_data(g, 0, c);
     read_stages(g, 0, c);

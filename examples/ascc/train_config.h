@@ -21,8 +21,9 @@ typedef struct ascc_train_sources {
 } ascc_train_sources;
 
 typedef struct ascc_train_config {
+    bool described;              /* the architecture is given */
     ascc_architecture architecture;
-    char model[ASCC_TRAIN_PATH]; /* a file in place of the architecture, or "" */
+    char model[ASCC_TRAIN_PATH]; /* a file in place of it, or with it for the weights; or "" */
     ascc_train_sources train, valid;
     ascc_training_stage stage[ASCC_TRAIN_STAGES];
     ascc_trainer_options options; /* `stage` points to the above */
