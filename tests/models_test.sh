@@ -54,5 +54,9 @@ for dimension in 2d 3d; do
     check "water$dimension-tiny says that it conserves angular momentum" conserves "$tiny" 'momentum, angular momentum'
     check "water$dimension-tiny conserves angular momentum when drops collide" turns "$tiny" $dimension
 done
+file=examples/models/paper3d.safetensors
+check "paper3d is at most 1 MB" small "$file"
+check "paper3d has a card with measurements" card paper3d
+check "paper3d conserves momentum to the bit when drops collide" exact "$file" 3d
 echo "1..$number"
 exit $failed

@@ -240,7 +240,7 @@ report $? 'a log that cannot be written is an error'
 
 for example in "$source"/examples/train/*.json; do
     [ -f "$example" ] || continue
-    sed -e 's#"[^"]*/\(liquid3d\|wbc2d\|data2d\)/[^"]*"#"data/*"#g' \
+    sed -e 's#"[^"]*/\(liquid3d\|wbc2d\|data2d\|data3d\)/[^"]*"#"data/*"#g' \
         -e "s#\"model\": \"[^\"]*\"#\"model\": \"$source/examples/models/water3d.safetensors\"#" \
         "$example" >example.json
     sed -i "s|\"output\": \"[^\"]*/[^\"]*\"|\"output\": \"$folder/nowhere/deep/m.safetensors\"|" example.json
