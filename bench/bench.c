@@ -287,8 +287,8 @@ int main(int count, char **arguments)
     static const struct {
         const char *name;
         void (*run)(const bench_options *);
-    } commands[] = {{"load", bench_load}, {"kernel", bench_kernel},   {"roofline", bench_roofline},
-                    {"step", bench_step}, {"threads", bench_threads}, {"scale", bench_scale},
+    } commands[] = {{"load", bench_load},  {"kernel", bench_kernel},   {"roofline", bench_roofline},
+                    {"step", bench_step},  {"threads", bench_threads}, {"scale", bench_scale},
                     {"train", bench_train}};
     const bench_options options = read_options(count, arguments);
     bool known = false;

@@ -8,7 +8,7 @@
 #include <stdbool.h>
 #include <stdio.h>
 
-#include "network.h"
+#include "network/network.h"
 
 typedef struct bench_options {
     const char *command;

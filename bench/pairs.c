@@ -10,7 +10,7 @@
 #include <string.h>
 
 #include "../tests/support/model_builder.h"
-#include "antisymmetric.h"
+#include "network/antisymmetric.h"
 #include "bench.h"
 
 #define BATCH 64

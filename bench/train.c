@@ -67,9 +67,8 @@ static void open_lesson(lesson *s, const bench_options *o, size_t count)
         ascc_trainer_add_sequence(s->trainer, &sequence))
         bench_fail("trainer: %s", ascc_trainer_message(s->trainer));
     s->gradient = malloc(ascc_trainer_parameter_count(s->trainer) * sizeof *s->gradient);
-    const ascc_particles_options particles = {.size = sizeof particles,
-                                              .dimension = 3,
-                                              .spacing = info.particle_spacing};
+    const ascc_particles_options particles = {
+        .size = sizeof particles, .dimension = 3, .spacing = info.particle_spacing};
     const ascc_const_array x = {.data = frames + 3 * count};
     if (ascc_particles_create(s->context, &particles, &s->particles) ||
         ascc_particles_add_fluid(s->particles, count, &x, NULL, NULL, NULL) ||
@@ -117,7 +116,8 @@ void bench_train(const bench_options *o)
     const size_t count = o->particles ? o->particles : o->quick ? 2000 : 5000;
     const size_t repeats = bench_repeats(o);
     bench_table table = bench_table_open(
-        o, "train", "one thread; ratios within a run; a rollout of so many steps, loss and gradient",
+        o, "train",
+        "one thread; ratios within a run; a rollout of so many steps, loss and gradient",
         "particles,steps,step_ns_per_particle,gradient_ns_per_particle_and_step,ratio,min,max");
     lesson s;
     open_lesson(&s, o, count);
@@ -130,7 +130,8 @@ void bench_train(const bench_options *o)
             gradient[r] = time_gradient(&s, horizon) / horizon;
             ratio[r] = gradient[r] / step[r];
         }
-        const bench_spread a = bench_spread_of(step, repeats), b = bench_spread_of(gradient, repeats);
+        const bench_spread a = bench_spread_of(step, repeats),
+                           b = bench_spread_of(gradient, repeats);
         const bench_spread c = bench_spread_of(ratio, repeats);
         const double ns = 1e9 / (double)count;
         bench_row(&table, "%zu,%d,%.1f,%.1f,%.2f,%.2f,%.2f", count, horizon, a.median * ns,

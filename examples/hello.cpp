@@ -8,7 +8,10 @@
 #include <ascc/ascc.h>
 
 template <class Handle, void (*destroy)(Handle **)> struct Destroy {
-    void operator()(Handle *handle) const { destroy(&handle); }
+    void operator()(Handle *handle) const
+    {
+        destroy(&handle);
+    }
 };
 template <class Handle, void (*destroy)(Handle **)>
 using Owned = std::unique_ptr<Handle, Destroy<Handle, destroy>>;
@@ -65,8 +68,7 @@ static void run(const char *path)
     ascc_step *step_handle = nullptr;
     check(ascc_step_create(context.get(), model.get(), nullptr, &step_handle), "step");
     const Step step(step_handle);
-    check(ascc_step_run(step.get(), particles.get(), nullptr, 100),
-          ascc_step_message(step.get()));
+    check(ascc_step_run(step.get(), particles.get(), nullptr, 100), ascc_step_message(step.get()));
 
     std::int64_t momentum[3];
     check(ascc_particles_total_momentum(particles.get(), momentum), "momentum");

@@ -44,9 +44,9 @@ static const model_random plain = {.seed = 14,
                                    .skip_self = 1};
 
 static const scene scenes[] = {
-    {"dam-2d", 2, 12, 60, NULL},           {"dam-3d", 3, 5, 20, NULL},
-    {"random-2d", 2, 8, 4, &flat},         {"farthest-2d", 2, 8, 4, &farthest},
-    {"random-3d", 3, 4, 3, &solid},        {"plain-3d", 3, 4, 3, &plain},
+    {"dam-2d", 2, 12, 60, NULL},    {"dam-3d", 3, 5, 20, NULL},
+    {"random-2d", 2, 8, 4, &flat},  {"farthest-2d", 2, 8, 4, &farthest},
+    {"random-3d", 3, 4, 3, &solid}, {"plain-3d", 3, 4, 3, &plain},
 };
 
 static void check(ascc_status status, const char *what)

@@ -2,7 +2,7 @@
  * SPDX-License-Identifier: MIT */
 #include "support/test.h"
 
-#include "context.h"
+#include "base/context.h"
 #include "support/counting.h"
 #include "support/failing_threads.h"
 

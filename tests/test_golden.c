@@ -2,8 +2,8 @@
  * SPDX-License-Identifier: MIT */
 #include <math.h>
 
-#include "antisymmetric.h"
-#include "resample.h"
+#include "network/antisymmetric.h"
+#include "points/resample.h"
 #include "support/golden.h"
 
 #define LAYER_TOLERANCE 2e-5 /* of the layer's largest value */

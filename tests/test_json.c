@@ -13,8 +13,8 @@
 #include <locale.h>
 #include <math.h>
 
-#include "json.h"
-#include "json_reader.h"
+#include "file/json.h"
+#include "file/json_reader.h"
 #include "support/failing_allocator.h"
 
 static ascc_message message;

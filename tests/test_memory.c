@@ -2,7 +2,7 @@
 #include "support/test.h"
 
 #include "support/counting.h"
-#include "memory.h"
+#include "base/memory.h"
 
 #include <string.h>
 

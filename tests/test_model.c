@@ -12,7 +12,7 @@
 
 #include <math.h>
 
-#include "model.h"
+#include "model/model.h"
 #include "support/failing_allocator.h"
 #include "support/model_builder.h"
 

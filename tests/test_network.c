@@ -2,7 +2,7 @@
  * SPDX-License-Identifier: MIT */
 #include <math.h>
 
-#include "network.h"
+#include "network/network.h"
 #include "support/model_builder.h"
 #include "support/tools.h"
 

@@ -3,7 +3,7 @@
 #include "support/test.h"
 
 #include "support/counting.h"
-#include "particles.h"
+#include "points/particles.h"
 #include "support/random.h"
 
 #include <float.h>

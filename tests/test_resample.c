@@ -1,7 +1,7 @@
 /* Coarser point sets against the definitions, point by point. SPDX-License-Identifier: MIT */
 #include <math.h>
 
-#include "resample.h"
+#include "points/resample.h"
 #include "support/tools.h"
 
 static double *cloud(dice *d, size_t count, int dimension, double low, double high)

@@ -11,7 +11,7 @@
 
 #include <cmocka.h>
 
-#include "safetensors.h"
+#include "file/safetensors.h"
 #include "support/failing_allocator.h"
 #include "support/model_builder.h"
 

@@ -3,7 +3,7 @@
 #include <math.h>
 
 #include "../examples/demo_model.h"
-#include "particles.h"
+#include "points/particles.h"
 #include "support/counting.h"
 #include "support/model_builder.h"
 #include "support/tools.h"
@@ -1034,10 +1034,8 @@ static room open_room(int32_t dimension, double contact, int32_t threads, double
                                  .walls = 1,
                                  .contact = contact};
     const ascc_context_options context = {.size = sizeof context, .thread_count = threads};
-    const ascc_particles_options options = {.size = sizeof options,
-                                            .dimension = dimension,
-                                            .spacing = spacing / unit,
-                                            .mass = 0.125};
+    const ascc_particles_options options = {
+        .size = sizeof options, .dimension = dimension, .spacing = spacing / unit, .mass = 0.125};
     const ascc_step_options step = {.size = sizeof step, .length_unit = unit};
     double x[1200 * 3], v[1200 * 3];
     dice random_numbers = {77};
@@ -1053,8 +1051,8 @@ static room open_room(int32_t dimension, double contact, int32_t threads, double
     }
     const ascc_const_array position = {.data = x, .scalar = ASCC_DOUBLE};
     const ascc_const_array velocity = {.data = v, .scalar = ASCC_DOUBLE};
-    assert_int_equal(ascc_particles_add_fluid(r.w.particles, SHOTS, &position, &velocity, NULL, NULL),
-                     ASCC_OK);
+    assert_int_equal(
+        ascc_particles_add_fluid(r.w.particles, SHOTS, &position, &velocity, NULL, NULL), ASCC_OK);
     size_t n = 0;
     const int side = (int)(ROOM / 0.8) + 1;
     for (size_t face = 0; face < 2 * r.d; face++)
@@ -1144,7 +1142,7 @@ static void contact_takes_what_points_into_the_wall_and_nothing_else(void **stat
     (void)state;
     room r = open_room(2, 0.4, 1, 1.0);
     const double v = 0.5 * spacing / 0.005; /* half a spacing a step */
-    for (size_t i = 0; i < SHOTS; i++) {    /* one is near the wall x = 0, the others rest far away */
+    for (size_t i = 0; i < SHOTS; i++) { /* one is near the wall x = 0, the others rest far away */
         const double x[2] = {i ? 2.5 * spacing + 100.0 * (double)i : 0.6 * spacing, 2.4 * spacing};
         for (size_t c = 0; c < 2; c++) {
             r.w.particles->position[i * 2 + c] = x[c];

@@ -4,7 +4,7 @@
 
 #include "support/counting.h"
 #include "support/failing_threads.h"
-#include "workers.h"
+#include "base/workers.h"
 
 #include <pthread.h>
 #include <sched.h>

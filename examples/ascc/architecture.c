@@ -577,8 +577,9 @@ static void basis_network(writer *w)
 {
     const ascc_architecture *a = w->a;
     char coarse[32], last[32] = "l0";
-    add(&w->network, ",\"features\":{\"fluid\":[\"one\",\"motion\"%s],"
-                     "\"boundary\":[\"one\",\"normal\",\"motion\"]},\"layers\":[",
+    add(&w->network,
+        ",\"features\":{\"fluid\":[\"one\",\"motion\"%s],"
+        "\"boundary\":[\"one\",\"normal\",\"motion\"]},\"layers\":[",
         a->gravity_seen ? ",\"gravity\"" : "");
     first_layer(w);
     if (a->levels)

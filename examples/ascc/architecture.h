@@ -19,7 +19,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#include "model.h"
+#include "model/model.h"
 
 enum { ASCC_ARCHITECTURE_LEVELS = 3 };
 
@@ -48,10 +48,11 @@ typedef struct ascc_architecture {
     double radius, wall_radius; /* spacings; wall_radius: of BASIS only */
     double output_radius;       /* of BASIS, spacings; 0 = radius */
     int32_t output_bumps;       /* of BASIS */
-    bool gravity_seen;   /* of BASIS: a feature of the fluid */
-    double impulse_limit; /* of BASIS: of one pair in a step, as spacings moved; 0 = none */
-    double contact;      /* of BASIS with walls seen: how close the fluid comes to them, spacings; 0 = as close as it gets */
-    bool seen_direction;        /* of BASIS: pairs act along the line that the network sees */
+    bool gravity_seen;          /* of BASIS: a feature of the fluid */
+    double impulse_limit;       /* of BASIS: of one pair in a step, as spacings moved; 0 = none */
+    double
+        contact; /* of BASIS with walls seen: how close the fluid comes to them, spacings; 0 = as close as it gets */
+    bool seen_direction; /* of BASIS: pairs act along the line that the network sees */
     int32_t bumps, order, wall_bumps;
     ascc_output_kind output;
     bool radial;            /* projection, of GRID only */

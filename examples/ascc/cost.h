@@ -2,7 +2,7 @@
 #ifndef ASCC_COST_H
 #define ASCC_COST_H
 
-#include "model.h"
+#include "model/model.h"
 
 /* Neighbours and points that a cost is told for: means over frames of moving fluid. */
 typedef struct ascc_cost_counts {

@@ -24,7 +24,7 @@
 #include "progress.h"
 #include "sequence.h"
 #include "train_config.h"
-#include "safetensors.h"
+#include "file/safetensors.h"
 #include "train_log.h"
 
 typedef struct training {
@@ -39,9 +39,9 @@ typedef struct training {
     size_t truth_count;
     ascc_progress progress;
     char label[160];
-    double loss;     /* of late */
-    double speed;    /* steps a second, of late */
-    double saved;    /* when the last checkpoint was written, s */
+    double loss;  /* of late */
+    double speed; /* steps a second, of late */
+    double saved; /* when the last checkpoint was written, s */
     char error[512];
 } training;
 
@@ -371,8 +371,8 @@ static bool run(training *t)
 /* ---- From config to trainer ----------------------------------------------------------------------- */
 
 /* Gives the tensors of one model file the numbers of another's of the same names and shapes. */
-static bool copy_weights(training *t, const unsigned char *from, size_t from_size, unsigned char *to,
-                         size_t to_size)
+static bool copy_weights(training *t, const unsigned char *from, size_t from_size,
+                         unsigned char *to, size_t to_size)
 {
     const ascc_allocator allocator = ascc_allocator_default();
     ascc_safetensors source, target;

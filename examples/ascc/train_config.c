@@ -7,7 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "json_reader.h"
+#include "file/json_reader.h"
 
 static const char SUFFIX[] = ".safetensors";
 static const double MANY = 1e9;

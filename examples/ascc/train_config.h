@@ -21,7 +21,7 @@ typedef struct ascc_train_sources {
 } ascc_train_sources;
 
 typedef struct ascc_train_config {
-    bool described;              /* the architecture is given */
+    bool described; /* the architecture is given */
     ascc_architecture architecture;
     char model[ASCC_TRAIN_PATH]; /* a file in place of it, or with it for the weights; or "" */
     ascc_train_sources train, valid;

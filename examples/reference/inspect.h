@@ -6,7 +6,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#include "common.h"
+#include "base/common.h"
 
 /* A sequence as inspect reads it. */
 typedef struct inspect_input {

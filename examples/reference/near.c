@@ -6,7 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "neighbors.h"
+#include "points/neighbors.h"
 
 #define MOST_NEIGHBORS 4096
 

@@ -8,7 +8,7 @@
 #ifndef REFERENCE_NEAR_H
 #define REFERENCE_NEAR_H
 
-#include "context.h"
+#include "base/context.h"
 
 typedef struct near_options {
     int32_t dimension;

@@ -2,7 +2,7 @@
 #ifndef REFERENCE_PBF_H
 #define REFERENCE_PBF_H
 
-#include "common.h"
+#include "base/common.h"
 
 typedef struct pbf pbf;
 

@@ -7,7 +7,7 @@
 #ifndef REFERENCE_SPH_H
 #define REFERENCE_SPH_H
 
-#include "common.h"
+#include "base/common.h"
 
 typedef struct sph sph;
 

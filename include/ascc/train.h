@@ -35,52 +35,53 @@ typedef struct ascc_training_sequence {
 
 /** A stretch of the schedule: until iteration `end`. */
 typedef struct ascc_training_stage {
-    uint64_t end;           /* iterations done when it is over, from the very start */
-    int32_t horizon;        /* T: steps of a rollout that the loss is taken over */
-    int32_t presteps;       /* W: steps before them without gradient; each rollout draws 0 to W */
-    double learning_rate;   /* at its beginning */
+    uint64_t end;             /* iterations done when it is over, from the very start */
+    int32_t horizon;          /* T: steps of a rollout that the loss is taken over */
+    int32_t presteps;         /* W: steps before them without gradient; each rollout draws 0 to W */
+    double learning_rate;     /* at its beginning */
     double learning_rate_end; /* at its end, on a geometric path; 0 = as at its beginning */
 } ascc_training_stage;
 
 /** Options of ascc_trainer_create. Zero means the default that is stated. */
 typedef struct ascc_trainer_options {
-    size_t size;                      /* sizeof(ascc_trainer_options) */
-    uint64_t seed;                    /* same seed and options, same weights to the bit */
-    int32_t thread_count;             /* rollouts computed at once; no influence on results; 0 = 1 */
-    int32_t batch;                    /* rollouts an iteration; 0 = 8 */
+    size_t size;          /* sizeof(ascc_trainer_options) */
+    uint64_t seed;        /* same seed and options, same weights to the bit */
+    int32_t thread_count; /* rollouts computed at once; no influence on results; 0 = 1 */
+    int32_t batch;        /* rollouts an iteration; 0 = 8 */
     const ascc_training_stage *stage; /* at least one, `end` ascending */
     int32_t stage_count;
-    int32_t position_gradients; /* 1: also through the places of particles; 0: as constants */
+    int32_t position_gradients;   /* 1: also through the places of particles; 0: as constants */
     double beta1, beta2, epsilon; /* Adam: 0.9, 0.999, 1e-8 */
-    double clip;                /* largest norm of a gradient; 0 = 1 */
-    double average;             /* each iteration's share that the averaged weights keep, such as 0.999;
+    double clip;                  /* largest norm of a gradient; 0 = 1 */
+    double average; /* each iteration's share that the averaged weights keep, such as 0.999;
                                    0 = not averaged */
-    double jitter;              /* noise on first positions and velocities, particle spacings (a step) */
-    int32_t rotate;             /* 1: turn rollouts about gravity (without gravity: about any axis) */
-    int32_t mirror;             /* 1: mirror every second rollout in a plane along gravity */
-    double neighbor_weight;     /* of exp(-w c / c_avg) in Eq. 3; 0 = 1; negative = all particles alike */
-    double density_weight;      /* of the penalty on compression, see docs/training.md; 0 = none */
-    double wall_weight;         /* of the penalty on particles in walls; 0 = none */
-    size_t memory_limit;        /* bytes of kept steps in all rollouts at once; what does not fit is
+    double jitter;  /* noise on first positions and velocities, particle spacings (a step) */
+    int32_t rotate; /* 1: turn rollouts about gravity (without gravity: about any axis) */
+    int32_t mirror; /* 1: mirror every second rollout in a plane along gravity */
+    double
+        neighbor_weight; /* of exp(-w c / c_avg) in Eq. 3; 0 = 1; negative = all particles alike */
+    double density_weight; /* of the penalty on compression, see docs/training.md; 0 = none */
+    double wall_weight;    /* of the penalty on particles in walls; 0 = none */
+    size_t memory_limit;   /* bytes of kept steps in all rollouts at once; what does not fit is
                                    computed a second time; 0 = 4 GiB */
-    char *message;              /* where creation says what is wrong; may be NULL */
+    char *message;         /* where creation says what is wrong; may be NULL */
     size_t message_size;
-    double truth_share;         /* of rollouts begun at true states, without steps before them, [0, 1];
+    double truth_share; /* of rollouts begun at true states, without steps before them, [0, 1];
                                    the others draw 0 to W */
 } ascc_trainer_options;
 
 /** What an iteration did. */
 typedef struct ascc_training_report {
-    size_t size;         /* sizeof(ascc_training_report) */
-    uint64_t iteration;  /* done in all */
-    double loss;         /* mean of Eq. 3 over steps and rollouts, particle spacings */
+    size_t size;          /* sizeof(ascc_training_report) */
+    uint64_t iteration;   /* done in all */
+    double loss;          /* mean of Eq. 3 over steps and rollouts, particle spacings */
     double gradient_norm; /* before clipping */
     double learning_rate;
     int32_t horizon, presteps;
-    int32_t ended_early;  /* rollouts whose steps without gradient blew up and were cut */
-    int32_t skipped;      /* rollouts left out: their steps could not be computed */
-    double seconds;       /* wall clock */
-    double steps;         /* computed forwards */
+    int32_t ended_early; /* rollouts whose steps without gradient blew up and were cut */
+    int32_t skipped;     /* rollouts left out: their steps could not be computed */
+    double seconds;      /* wall clock */
+    double steps;        /* computed forwards */
 } ascc_training_report;
 
 /**

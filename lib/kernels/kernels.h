@@ -85,6 +85,17 @@ typedef struct ascc_kernels {
     int (*pair_impulses)(const float *term, const double factor[4], const double *mass,
                          size_t mass_step, double limit, const uint32_t *neighbor, size_t k,
                          int64_t own[4], int64_t *sum);
+
+    /* Of the way back: gradient[neighbor[i]][a] += sum over members m of factor[m * stride + i] *
+     * column[m][a], pairs in order; members come in bumps of so many harmonics, and a bump whose
+     * first factor is 0 is left out. */
+    void (*scatter)(const float *factor, size_t stride, size_t bumps, size_t harmonics,
+                    const uint32_t *neighbor, size_t k, const float *column, size_t a,
+                    float *gradient);
+
+    /* dot[m * stride + i] = sum over a of column[m][a] * feature[neighbor[i]][a]. */
+    void (*dot)(const float *column, size_t members, const uint32_t *neighbor, size_t k,
+                const float *feature, size_t a, float *dot, size_t stride);
 } ascc_kernels;
 
 /* Fills the table with the best variants among the bits of cpu (ASCC_CPU_*). */

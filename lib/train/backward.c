@@ -32,8 +32,8 @@ bool ascc_transposed_create(ascc_transposed *transposed, const ascc_network *net
     for (int32_t t = 0; t < plan->term_count; t++)
         transposed->count += transposed_size(plan, t);
     transposed->block = ascc_allocate(network->allocator, transposed->count, sizeof(float));
-    transposed->term = ascc_allocate(network->allocator, (size_t)plan->term_count,
-                                     sizeof *transposed->term);
+    transposed->term =
+        ascc_allocate(network->allocator, (size_t)plan->term_count, sizeof *transposed->term);
     if (!transposed->block || !transposed->term) {
         ascc_transposed_destroy(transposed, network);
         return false;
@@ -91,8 +91,7 @@ static void fold_output(const ascc_plan *plan, const float *base, const float *a
             const float *part = ascc_output_part(output, p, &bumps);
             for (size_t k = 0; part && k < bumps; k++)
                 for (size_t i = 0; i < a; i++)
-                    gradient[(size_t)(part - base) + k * a + i] +=
-                        arranged[i * ASCC_MAX_BUMPS + k];
+                    gradient[(size_t)(part - base) + k * a + i] += arranged[i * ASCC_MAX_BUMPS + k];
         }
         return;
     }
@@ -217,8 +216,8 @@ static void add_weights(const ascc_passing *p, const ascc_term *term, size_t n)
     const size_t b = ascc_padded(term->outputs);
     const size_t cells = term->kind == ASCC_TERM_CONVOLUTION ? ascc_cell_count(&term->filter) : 1;
     const size_t length = cells * ascc_padded(term->inputs);
-    float *to = p->pass->arranged +
-                (network->term_weight[term - network->plan->term] - network->weights);
+    float *to =
+        p->pass->arranged + (network->term_weight[term - network->plan->term] - network->weights);
     p->run->tools->kernels->multiply(p->turned, TILE, length, n, p->tile, b, to, b);
     if (term->bias) {
         float *bias = p->pass->bias + (term->bias - p->pass->step->model->weights);
@@ -251,12 +250,12 @@ static void scatter_row(const ascc_passing *p, const ascc_term *term, const ascc
         memset(to, 0, count * a * sizeof *to);
     }
     if (term->kind == ASCC_TERM_TRANSFER)
-        p->pass->kernels->scatter(p->scratch.geometry + 3 * room, room, 1, 1, write, count,
-                                  column_gradient, a, to);
+        p->run->tools->kernels->scatter(p->scratch.geometry + 3 * room, room, 1, 1, write, count,
+                                        column_gradient, a, to);
     else if (term->filter.bumps)
-        p->pass->kernels->scatter(p->scratch.factor, room, (size_t)term->filter.bumps,
-                                  (size_t)term->filter.cells[0], write, count, column_gradient, a,
-                                  to);
+        p->run->tools->kernels->scatter(p->scratch.factor, room, (size_t)term->filter.bumps,
+                                        (size_t)term->filter.cells[0], write, count,
+                                        column_gradient, a, to);
     else
         ascc_backward_scatter_grid(p, term, write, count, column_gradient, to);
     if (!term->relative)

@@ -8,15 +8,14 @@
 #ifndef ASCC_BACKWARD_H
 #define ASCC_BACKWARD_H
 
-#include "../step.h"
-#include "kernels.h"
+#include "step/step.h"
 
 /* Weights once more, turned over: what gradients of columns are made with. */
 typedef struct ascc_transposed {
     float *block;
     size_t count;
-    const float **term;              /* [term_count]: [outputs][cells][inputs], padded; NULL = none */
-    const float *part[ASCC_PARTS];   /* of an output with a basis: [8][inputs] */
+    const float **term;            /* [term_count]: [outputs][cells][inputs], padded; NULL = none */
+    const float *part[ASCC_PARTS]; /* of an output with a basis: [8][inputs] */
 } ascc_transposed;
 
 bool ascc_transposed_create(ascc_transposed *transposed, const ascc_network *network);
@@ -28,14 +27,13 @@ typedef struct ascc_backward {
     const ascc_step *step;
     const ascc_step_trace *trace;
     const ascc_transposed *transposed;
-    const ascc_train_kernels *kernels;
-    ascc_arena *arena;         /* scratch */
-    const double *position;    /* before the step */
-    const double *correction;  /* gradient of the velocity corrections, per m/s */
-    float *arranged;           /* += gradient of the weights as the network arranges them */
-    float *bias;               /* += gradient of biases, laid out as the model's weights */
-    double *velocity;          /* += gradient of the velocities seen, per m/s; or NULL */
-    double *seen, *place;      /* += gradient of positions seen and before the step, per m; or NULL */
+    ascc_arena *arena;        /* scratch */
+    const double *position;   /* before the step */
+    const double *correction; /* gradient of the velocity corrections, per m/s */
+    float *arranged;          /* += gradient of the weights as the network arranges them */
+    float *bias;              /* += gradient of biases, laid out as the model's weights */
+    double *velocity;         /* += gradient of the velocities seen, per m/s; or NULL */
+    double *seen, *place; /* += gradient of positions seen and before the step, per m; or NULL */
 } ascc_backward;
 
 /* errors: MEMORY. */

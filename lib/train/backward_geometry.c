@@ -107,8 +107,8 @@ static void map_volume(dual at[3])
     const dual large = along_x ? at[0] : at[1], small = along_x ? at[1] : at[0];
     const dual t = signed_like(root(c2), large), v = quotient(small, large);
     const double four_by_pi = 1.2732395447351628;
-    const dual o = product(t, chain(v, four_by_pi * atan(v.value),
-                                    four_by_pi / (1.0 + v.value * v.value)));
+    const dual o =
+        product(t, chain(v, four_by_pi * atan(v.value), four_by_pi / (1.0 + v.value * v.value)));
     at[0] = along_x ? t : o;
     at[1] = along_x ? o : t;
 }
@@ -165,7 +165,10 @@ void ascc_trilinear_at(const int32_t cells[3], const double at[3], ascc_trilinea
         t->cell[n] = 0;
         for (int c = 0; c < 3; c++) {
             weight *= share[c][bit[c]];
-            t->cell[n] += (low[c] + (bit[c] && step[c] ? 1u : 0u)) * (c == 0 ? 1 : c == 1 ? (size_t)cells[0] : (size_t)cells[0] * (size_t)cells[1]);
+            t->cell[n] += (low[c] + (bit[c] && step[c] ? 1u : 0u)) *
+                          (c == 0   ? 1
+                           : c == 1 ? (size_t)cells[0]
+                                    : (size_t)cells[0] * (size_t)cells[1]);
         }
         t->weight[n] = weight;
         for (int c = 0; c < 3; c++) {
@@ -185,8 +188,8 @@ static float grid_window(const ascc_passing *p, const ascc_filter *filter, size_
 }
 
 void ascc_backward_scatter_grid(const ascc_passing *p, const ascc_term *term,
-                                const uint32_t *neighbor, size_t count, const float *column_gradient,
-                                float *gradient)
+                                const uint32_t *neighbor, size_t count,
+                                const float *column_gradient, float *gradient)
 {
     const size_t a = ascc_padded(term->inputs), room = p->scratch.room;
     const float *geometry = p->scratch.geometry;
@@ -246,8 +249,8 @@ static void harmonics_at(const double u[3], size_t harmonics, double by[9][3])
 }
 
 /* The gradient of the displacement of one pair of a basis, from the gradients of its members. */
-static void basis_pair(const ascc_passing *p, const ascc_filter *filter, size_t k, const double r[3],
-                       double g[3])
+static void basis_pair(const ascc_passing *p, const ascc_filter *filter, size_t k,
+                       const double r[3], double g[3])
 {
     const size_t harmonics = (size_t)filter->cells[0], room = p->scratch.room;
     const double distance = sqrt(r[0] * r[0] + r[1] * r[1] + r[2] * r[2]);
@@ -278,7 +281,8 @@ static void basis_pair(const ascc_passing *p, const ascc_filter *filter, size_t 
         g[c] = by_rho * u[c] / filter->radius + (by_u[c] - along * u[c]) / distance;
 }
 
-static void hat_pairs(const ascc_passing *p, const ascc_term *term, const ascc_rows *rows, size_t row)
+static void hat_pairs(const ascc_passing *p, const ascc_term *term, const ascc_rows *rows,
+                      size_t row)
 {
     const size_t count = rows->count[row], room = p->scratch.room;
     const uint32_t *neighbor = rows->neighbor + rows->start[row];
@@ -294,7 +298,10 @@ static void hat_pairs(const ascc_passing *p, const ascc_term *term, const ascc_r
             ascc_seen_displacement(p, rows, row, neighbor[k], r);
             for (int c = 0; c < 3; c++) {
                 hat[c] = fmax(1.0 - fabs(r[c]) / term->voxel, 0.0);
-                slope[c] = hat[c] > 0.0 ? (r[c] > 0.0 ? -1.0 : r[c] < 0.0 ? 1.0 : 0.0) / term->voxel
+                slope[c] = hat[c] > 0.0 ? (r[c] > 0.0   ? -1.0
+                                           : r[c] < 0.0 ? 1.0
+                                                        : 0.0) /
+                                              term->voxel
                                         : 0.0;
             }
             if (!pass) {
@@ -344,11 +351,10 @@ void ascc_backward_geometry(const ascc_passing *p, const ascc_term *term, const 
 {
     const size_t a = ascc_padded(term->inputs), count = rows->count[row], room = p->scratch.room;
     const uint32_t *neighbor = rows->neighbor + rows->start[row];
-    const float *feature = term->relative ? p->scratch.relative
-                                          : ascc_network_source(p->run, term);
+    const float *feature = term->relative ? p->scratch.relative : ascc_network_source(p->run, term);
     const uint32_t *read = term->relative ? p->scratch.sequence : neighbor;
     if (term->kind == ASCC_TERM_TRANSFER) {
-        p->pass->kernels->dot(column_gradient, 1, read, count, feature, a, p->dot, room);
+        p->run->tools->kernels->dot(column_gradient, 1, read, count, feature, a, p->dot, room);
         hat_pairs(p, term, rows, row);
         return;
     }
@@ -356,8 +362,8 @@ void ascc_backward_geometry(const ascc_passing *p, const ascc_term *term, const 
         grid_pairs(p, term, rows, row, feature, read, column_gradient);
         return;
     }
-    p->pass->kernels->dot(column_gradient, ascc_cell_count(&term->filter), read, count, feature, a,
-                          p->dot, room);
+    p->run->tools->kernels->dot(column_gradient, ascc_cell_count(&term->filter), read, count,
+                                feature, a, p->dot, room);
     for (size_t k = 0; k < count; k++) {
         double r[3], g[3];
         ascc_seen_displacement(p, rows, row, neighbor[k], r);

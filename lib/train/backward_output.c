@@ -10,11 +10,11 @@ typedef struct pairs_pass {
     const ascc_passing *p;
     const ascc_rows *rows;
     int32_t set;
-    const float *value;      /* [row][inputs] */
-    float *value_gradient;   /* or NULL */
-    const double *g;         /* [row][3] gradient of the corrections times units; walls 0 */
-    const double *place;     /* [row][3] before the step, or NULL: directions as the network sees */
-    const uint8_t *fluid;    /* [row] */
+    const float *value;    /* [row][inputs] */
+    float *value_gradient; /* or NULL */
+    const double *g;       /* [row][3] gradient of the corrections times units; walls 0 */
+    const double *place;   /* [row][3] before the step, or NULL: directions as the network sees */
+    const uint8_t *fluid;  /* [row] */
     float *share[ASCC_PARTS], *share_gradient[ASCC_PARTS]; /* [row][8] */
 } pairs_pass;
 
@@ -98,15 +98,15 @@ static void add_share(const pairs_pass *q, int part, size_t i, const bumps_at *a
 /* One pair and what its impulse along u is made of: cosine * strength - damping * approach. */
 typedef struct pair {
     size_t i, j;
-    bool both;              /* j is fluid, too */
+    bool both;               /* j is fluid, too */
     double distance, length; /* of r, seen, and of d, along which the pair acts */
-    double seen[3], u[3];   /* unit vectors of r and d */
+    double seen[3], u[3];    /* unit vectors of r and d */
     double cosine, strength, damping, approach;
-    double slope, damping_slope; /* of strength and damping by distance over radius */
+    double slope, damping_slope;  /* of strength and damping by distance over radius */
     double force[3], relative[3]; /* gradient of the impulse; motion of i less that of j */
-    double along;                /* force . u */
-    double total;                /* the impulse along u, limited */
-    bool limited;                /* then nothing but u changes it */
+    double along;                 /* force . u */
+    double total;                 /* the impulse along u, limited */
+    bool limited;                 /* then nothing but u changes it */
 } pair;
 
 /* Gradients by r (seen) and d (the line), added to the positions'. */
@@ -121,7 +121,8 @@ static void pass_places(const pairs_pass *q, const pair *a, const ascc_filter *f
         a->along * (a->cosine * a->slope - a->damping_slope * a->approach) / filter->radius;
     double by_u[3], by_seen[3], seen_i[3], seen_j[3], turned = 0.0, seen_turned = 0.0;
     for (size_t c = 0; c < 3; c++) {
-        by_u[c] = a->force[c] * a->total - a->damping * a->along * a->relative[c] + (before ? by_cosine * a->seen[c] : 0.0);
+        by_u[c] = a->force[c] * a->total - a->damping * a->along * a->relative[c] +
+                  (before ? by_cosine * a->seen[c] : 0.0);
         by_seen[c] = before ? by_cosine * a->u[c] : 0.0;
         turned += by_u[c] * a->u[c];
         seen_turned += by_seen[c] * a->seen[c];
@@ -181,7 +182,8 @@ static void pass_pair(const pairs_pass *q, int part, const ascc_filter *filter, 
 {
     const ascc_passing *p = q->p;
     const ascc_plan *plan = p->run->network->plan;
-    pair a = {.i = i, .j = j, .both = both, .distance = sqrt(dot3(r, r)), .length = sqrt(dot3(d, d))};
+    pair a = {
+        .i = i, .j = j, .both = both, .distance = sqrt(dot3(r, r)), .length = sqrt(dot3(d, d))};
     if (a.length == 0.0)
         return;
     const bumps_at at = find_bumps(a.distance / filter->radius, filter->bumps);
@@ -223,10 +225,9 @@ static bool take_shares(pairs_pass *q)
         memset(q->share_gradient[part], 0, size * sizeof(float));
         for (size_t i = 0; i < count; i++)
             if (active[i])
-                p->run->tools->kernels->multiply(q->value + i * a, a, 1, a,
-                                                 network->part_weight[part], ASCC_MAX_BUMPS,
-                                                 q->share[part] + i * ASCC_MAX_BUMPS,
-                                                 ASCC_MAX_BUMPS);
+                p->run->tools->kernels->multiply(
+                    q->value + i * a, a, 1, a, network->part_weight[part], ASCC_MAX_BUMPS,
+                    q->share[part] + i * ASCC_MAX_BUMPS, ASCC_MAX_BUMPS);
     }
     return true;
 }
@@ -251,7 +252,8 @@ static void pass_shares(const pairs_pass *q)
         for (size_t i = 0; i < count; i++)
             for (size_t c = 0; active[i] && c < a; c++)
                 for (size_t k = 0; k < ASCC_MAX_BUMPS; k++)
-                    to[c * ASCC_MAX_BUMPS + k] += q->value[i * a + c] * share[i * ASCC_MAX_BUMPS + k];
+                    to[c * ASCC_MAX_BUMPS + k] +=
+                        q->value[i * a + c] * share[i * ASCC_MAX_BUMPS + k];
     }
 }
 

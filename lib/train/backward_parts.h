@@ -31,9 +31,9 @@ static inline void ascc_seen_displacement(const ascc_passing *p, const ascc_rows
                                           size_t j, double r[3])
 {
     for (int c = 0; c < 3; c++)
-        r[c] = p->run->hierarchy->scale.unit *
-               (double)(int32_t)((uint32_t)rows->source->low[c][j] -
-                                 (uint32_t)rows->query->low[c][row]);
+        r[c] =
+            p->run->hierarchy->scale.unit * (double)(int32_t)((uint32_t)rows->source->low[c][j] -
+                                                              (uint32_t)rows->query->low[c][row]);
 }
 
 /* Gradients of the output layer: its source, its weights, velocities, positions. */
@@ -41,8 +41,8 @@ ascc_status ascc_backward_output(ascc_passing *p);
 
 /* gradient[neighbour] += what a grid convolution's column took from it; geometry is in scratch. */
 void ascc_backward_scatter_grid(const ascc_passing *p, const ascc_term *term,
-                                const uint32_t *neighbor, size_t count, const float *column_gradient,
-                                float *gradient);
+                                const uint32_t *neighbor, size_t count,
+                                const float *column_gradient, float *gradient);
 
 /* Gradients of the positions that a row's geometry came from; geometry is in scratch. */
 void ascc_backward_geometry(const ascc_passing *p, const ascc_term *term, const ascc_rows *rows,

@@ -6,7 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "../plan.h"
+#include "model/plan.h"
 #include "near.h"
 
 #define BINS 4096 /* of the histograms that percentiles come from */
@@ -47,7 +47,8 @@ static ascc_status check(const ascc_plan *plan, const ascc_training_sequence *g,
     for (int c = 0; c < 3; c++)
         if (!isfinite(g->gravity[c]) || !(g->share >= 0.0) || !isfinite(g->share))
             return ascc_fail(message, ASCC_ERROR_ARGUMENT,
-                             "sequence %s: gravity or share is not a number that makes sense", name);
+                             "sequence %s: gravity or share is not a number that makes sense",
+                             name);
     return ASCC_OK;
 }
 
@@ -102,9 +103,9 @@ static ascc_status measure_fluid(ascc_kept_sequence *s, const ascc_plan *plan, s
     return status;
 }
 
-static ascc_status measure_walls(const ascc_kept_sequence *s, const ascc_plan *plan, const double *x,
-                                 const double *wall, const ascc_search_tools *tools,
-                                 histogram *depth)
+static ascc_status measure_walls(const ascc_kept_sequence *s, const ascc_plan *plan,
+                                 const double *x, const double *wall,
+                                 const ascc_search_tools *tools, histogram *depth)
 {
     const size_t d = (size_t)s->dimension;
     ascc_near near;
@@ -129,8 +130,8 @@ static ascc_status measure_walls(const ascc_kept_sequence *s, const ascc_plan *p
     return status;
 }
 
-static ascc_status measure(ascc_kept_sequence *s, const ascc_allocator *allocator, const ascc_plan *plan,
-                           const ascc_search_tools *tools)
+static ascc_status measure(ascc_kept_sequence *s, const ascc_allocator *allocator,
+                           const ascc_plan *plan, const ascc_search_tools *tools)
 {
     const size_t d = (size_t)s->dimension, n = s->fluid_count * d, w = s->boundary_count * d;
     const ascc_placement none = ascc_placement_none();
@@ -163,8 +164,8 @@ static ascc_status measure(ascc_kept_sequence *s, const ascc_allocator *allocato
 }
 
 ascc_status ascc_kept_sequence_create(ascc_kept_sequence *s, const ascc_allocator *allocator,
-                                 const ascc_plan *plan, const ascc_training_sequence *given,
-                                 const ascc_search_tools *tools)
+                                      const ascc_plan *plan, const ascc_training_sequence *given,
+                                      const ascc_search_tools *tools)
 {
     memset(s, 0, sizeof *s);
     ascc_status status = check(plan, given, tools->message);
@@ -292,14 +293,13 @@ static void draw_angle(ascc_random *random, double *cosine, double *sine)
 static void make_turn(double turn[3][3], const double axis[3], double cosine, double sine,
                       const double *across)
 {
-    const double cross[3][3] = {{0.0, -axis[2], axis[1]},
-                                {axis[2], 0.0, -axis[0]},
-                                {-axis[1], axis[0], 0.0}};
+    const double cross[3][3] = {
+        {0.0, -axis[2], axis[1]}, {axis[2], 0.0, -axis[0]}, {-axis[1], axis[0], 0.0}};
     double rotation[3][3];
     for (int i = 0; i < 3; i++)
         for (int j = 0; j < 3; j++)
-            rotation[i][j] = (i == j ? cosine : 0.0) + sine * cross[i][j] +
-                             (1.0 - cosine) * axis[i] * axis[j];
+            rotation[i][j] =
+                (i == j ? cosine : 0.0) + sine * cross[i][j] + (1.0 - cosine) * axis[i] * axis[j];
     for (int i = 0; i < 3; i++)
         for (int j = 0; j < 3; j++) {
             turn[i][j] = rotation[i][j];

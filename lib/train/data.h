@@ -5,8 +5,8 @@
 
 #include <ascc/train.h>
 
-#include "../model.h"
-#include "../neighbors.h"
+#include "model/model.h"
+#include "points/neighbors.h"
 
 typedef struct ascc_kept_sequence {
     char name[128];
@@ -21,8 +21,8 @@ typedef struct ascc_kept_sequence {
 
 /* Copies and measures. tools: an arena that is reset. errors: ARGUMENT, MEMORY, MISMATCH, NOT_FINITE. */
 ascc_status ascc_kept_sequence_create(ascc_kept_sequence *sequence, const ascc_allocator *allocator,
-                                 const ascc_plan *plan, const ascc_training_sequence *given,
-                                 const ascc_search_tools *tools);
+                                      const ascc_plan *plan, const ascc_training_sequence *given,
+                                      const ascc_search_tools *tools);
 void ascc_kept_sequence_destroy(ascc_kept_sequence *sequence, const ascc_allocator *allocator);
 
 /* A motion of the whole scene: x -> turn x + shift. */
@@ -45,7 +45,7 @@ double ascc_random_normal(ascc_random *random);
 
 /* A turn about gravity (without gravity: about any axis), a mirror in a plane along it, and a shift
  * within a cube of this edge. */
-ascc_placement ascc_placement_draw(ascc_random *random, const ascc_kept_sequence *sequence, bool rotate,
-                                   bool mirror, double edge);
+ascc_placement ascc_placement_draw(ascc_random *random, const ascc_kept_sequence *sequence,
+                                   bool rotate, bool mirror, double edge);
 
 #endif

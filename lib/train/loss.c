@@ -101,9 +101,9 @@ static ascc_status wall_loss(const ascc_rollout_task *task, const ascc_plan *pla
 }
 
 ascc_status ascc_loss_of(const ascc_rollout_task *task, const ascc_plan *plan,
-                         const ascc_search_tools *tools, const double *position, const double *truth,
-                         const double *wall, const double *normal, size_t frame, double share,
-                         double *loss, double *gradient)
+                         const ascc_search_tools *tools, const double *position,
+                         const double *truth, const double *wall, const double *normal,
+                         size_t frame, double share, double *loss, double *gradient)
 {
     ascc_status status = ASCC_OK;
     double sum = distance_loss(task, plan, position, truth, frame, share, gradient);

@@ -3,8 +3,9 @@
 
 #include <string.h>
 
-static ascc_status fill(ascc_points *points, const ascc_search_tools *tools, const ascc_scale *scale,
-                        int32_t dimension, const double *position, size_t count)
+static ascc_status fill(ascc_points *points, const ascc_search_tools *tools,
+                        const ascc_scale *scale, int32_t dimension, const double *position,
+                        size_t count)
 {
     const size_t d = (size_t)dimension;
     if (!ascc_points_take(points, tools->arena, count))

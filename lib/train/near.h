@@ -2,7 +2,7 @@
 #ifndef ASCC_TRAIN_NEAR_H
 #define ASCC_TRAIN_NEAR_H
 
-#include "../neighbors.h"
+#include "points/neighbors.h"
 
 /* Neighbours of query row i: rows->neighbor[rows->start[i] ..] of the source. */
 typedef struct ascc_near {

@@ -15,7 +15,6 @@ bool ascc_rollout_worker_open(ascc_rollout_worker *w, ascc_context *context,
     w->context = context;
     w->model = model;
     w->kept_count = (size_t)longest_horizon;
-    ascc_train_kernels_select(&w->kernels, context->cpu);
     ascc_arena_open(&w->scratch, &context->allocator);
     ascc_arena_open(&w->loss_scratch, &context->allocator);
     w->kept = ascc_allocate(&context->allocator, w->kept_count, sizeof *w->kept);
@@ -55,11 +54,11 @@ typedef struct rollout {
     const ascc_plan *plan;
     ascc_particles *particles;
     ascc_motion motion;
-    size_t numbers, walls;      /* coordinates of the fluid, of the walls */
-    double *wall, *normal;      /* [boundary][dimension] */
+    size_t numbers, walls; /* coordinates of the fluid, of the walls */
+    double *wall, *normal; /* [boundary][dimension] */
     double *truth;
-    double *state;              /* [horizon + 1] positions before each step, and after the last */
-    int64_t *momentum;          /* [horizon] before each step */
+    double *state;     /* [horizon + 1] positions before each step, and after the last */
+    int64_t *momentum; /* [horizon] before each step */
     double *by_position, *by_velocity, *seen, *place, *velocity;
     size_t first_frame; /* of the first step with gradient: state 0 is there */
 } rollout;
@@ -129,7 +128,8 @@ static ascc_status open_particles(rollout *r)
     const ascc_const_array normal = {.data = r->normal, .scalar = ASCC_DOUBLE};
     ascc_status status = ascc_particles_create(r->worker->context, &options, &r->particles);
     if (status == ASCC_OK)
-        status = ascc_particles_add_fluid(r->particles, s->fluid_count, &position, NULL, NULL, NULL);
+        status =
+            ascc_particles_add_fluid(r->particles, s->fluid_count, &position, NULL, NULL, NULL);
     if (status == ASCC_OK && s->boundary_count)
         status =
             ascc_particles_add_boundary(r->particles, s->boundary_count, &wall, &normal, 0, NULL);
@@ -223,7 +223,6 @@ static ascc_status step_back(rollout *r, size_t t, const ascc_step_trace *trace,
     const ascc_backward pass = {.step = w->step,
                                 .trace = trace,
                                 .transposed = r->transposed,
-                                .kernels = &w->kernels,
                                 .arena = &w->scratch,
                                 .position = r->state + t * n,
                                 .correction = r->by_velocity,

@@ -12,8 +12,8 @@ typedef struct ascc_rollout_task {
     size_t frame; /* where it starts, >= 1 */
     int32_t presteps, horizon;
     ascc_placement placement;
-    double jitter;       /* m and, over a time step, m/s */
-    ascc_random random;  /* of the jitter */
+    double jitter;      /* m and, over a time step, m/s */
+    ascc_random random; /* of the jitter */
     double neighbor_weight, density_weight, wall_weight;
     bool position_gradients;
     bool backward;       /* false: the loss alone */
@@ -23,7 +23,7 @@ typedef struct ascc_rollout_task {
 /* What became of it. */
 typedef struct ascc_rollout_result {
     double loss;
-    int32_t steps; /* computed forwards, again for the way back not counted */
+    int32_t steps;    /* computed forwards, again for the way back not counted */
     bool ended_early; /* steps without gradient blew up: the rest began at the true state */
     bool skipped;     /* a step with gradient could not be computed: no gradient */
     size_t failed_frame;
@@ -35,10 +35,9 @@ typedef struct ascc_rollout_worker {
     ascc_context *context;
     const ascc_model *model;
     ascc_step *step;
-    ascc_train_kernels kernels;
     ascc_arena scratch, loss_scratch; /* of reverse passes, of losses */
-    ascc_arena *kept;                 /* [kept_count] arenas of steps, by number modulo their count */
-    ascc_step_trace *trace;           /* [kept_count] */
+    ascc_arena *kept;       /* [kept_count] arenas of steps, by number modulo their count */
+    ascc_step_trace *trace; /* [kept_count] */
     size_t kept_count;
     double *memory; /* states and gradients */
     size_t memory_count;
@@ -57,8 +56,8 @@ ascc_rollout_result ascc_rollout_run(ascc_rollout_worker *worker, const ascc_tra
 /* Loss of one state against the truth and its gradient (NULL = not wanted), [fluid][dimension], times
  * `share`. errors: MEMORY, RANGE. */
 ascc_status ascc_loss_of(const ascc_rollout_task *task, const ascc_plan *plan,
-                         const ascc_search_tools *tools, const double *position, const double *truth,
-                         const double *wall, const double *normal, size_t frame, double share,
-                         double *loss, double *gradient);
+                         const ascc_search_tools *tools, const double *position,
+                         const double *truth, const double *wall, const double *normal,
+                         size_t frame, double share, double *loss, double *gradient);
 
 #endif

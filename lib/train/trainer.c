@@ -613,10 +613,11 @@ static ascc_status count_deaf(ascc_trainer *t, const ascc_training_report *repor
     if (t->deaf < IN_VAIN)
         return ASCC_OK;
     t->deaf = 0;
-    return FAIL(ASCC_ERROR_RANGE,
-                "the gradient was exactly 0 in the last %d iterations: all channels of a layer are off for "
-                "good; go on from an earlier model, with a smaller learning rate",
-                IN_VAIN);
+    return FAIL(
+        ASCC_ERROR_RANGE,
+        "the gradient was exactly 0 in the last %d iterations: all channels of a layer are off for "
+        "good; go on from an earlier model, with a smaller learning rate",
+        IN_VAIN);
 }
 
 ascc_status ascc_trainer_iterate(ascc_trainer *t, ascc_training_report *report)

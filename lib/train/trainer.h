@@ -4,7 +4,7 @@
 
 #include <ascc/train.h>
 
-#include "../plan.h"
+#include "model/plan.h"
 #include "rollout.h"
 
 #define ASCC_TRAINER_MAGIC 0x54435341u /* "ASCT" */
@@ -22,7 +22,7 @@ struct ascc_trainer {
     ascc_allocator allocator;
     ascc_context *context; /* one thread: rollouts run side by side, each on its own */
     ascc_workers *workers;
-    ascc_model *model; /* its weights are the ones being trained */
+    ascc_model *model;                     /* its weights are the ones being trained */
     unsigned char *bytes, *averaged_bytes; /* the model file, filled in when asked for */
     size_t byte_count, header_count; /* header_count: of the bytes that weights do not change */
     ascc_safetensors file, averaged_file;
@@ -45,11 +45,11 @@ struct ascc_trainer {
     uint64_t iteration;
     /* [parameters] each, one block: */
     float *weights, *average, *moment1, *moment2;
-    float *before;            /* the same four before the weights last changed */
+    float *before; /* the same four before the weights last changed */
     uint64_t before_iteration;
-    int32_t in_vain;          /* iterations of late without any rollout */
-    int32_t deaf;             /* iterations of late without any gradient */
-    bool changed;             /* there is a before */
+    int32_t in_vain; /* iterations of late without any rollout */
+    int32_t deaf;    /* iterations of late without any gradient */
+    bool changed;    /* there is a before */
     ascc_message message;
 };
 

@@ -14,7 +14,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "model.h"
+#include "model/model.h"
 #include "support/model_builder.h"
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);

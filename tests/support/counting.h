@@ -3,7 +3,7 @@
 #ifndef ASCC_TEST_COUNTING_H
 #define ASCC_TEST_COUNTING_H
 
-#include "memory.h"
+#include "base/memory.h"
 
 /* Zero is a good start. Not for several threads at once. */
 typedef struct test_memory {

@@ -3,7 +3,7 @@
 #ifndef ASCC_TEST_GOLDEN_H
 #define ASCC_TEST_GOLDEN_H
 
-#include "safetensors.h"
+#include "file/safetensors.h"
 #include "support/tools.h"
 
 typedef struct golden {

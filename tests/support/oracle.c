@@ -1,7 +1,7 @@
 /* Brute force, in doubles. SPDX-License-Identifier: MIT */
 #include "oracle.h"
 
-#include "safetensors.h"
+#include "file/safetensors.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -562,8 +562,7 @@ static void run_layers(network_state *n, const double *velocity)
     n->value[1] = make_values(n, ASCC_SET_BOUNDARY, plan->boundary_channels);
     for (size_t i = 0; i < o->fluid_count; i++)
         set_features(plan, plan->fluid_features, plan->fluid_feature_count, velocity + i * d,
-                     o->gravity, false,
-                     n->value[0].row + i * (size_t)plan->fluid_channels);
+                     o->gravity, false, n->value[0].row + i * (size_t)plan->fluid_channels);
     for (size_t i = 0; i < n->sets->set[ASCC_SET_BOUNDARY].count; i++) {
         const size_t wall = n->sets->set[ASCC_SET_BOUNDARY].point[i].particle - o->fluid_count;
         set_features(plan, plan->boundary_features, plan->boundary_feature_count,
@@ -652,8 +651,7 @@ static void central_pair(const network_state *n, const ascc_filter *filter, cons
         return;
     double strength = strength_of(n, filter, tensor, f, length);
     if (before)
-        strength *=
-            (line[0] * seen[0] + line[1] * seen[1] + line[2] * seen[2]) / (across * length);
+        strength *= (line[0] * seen[0] + line[1] * seen[1] + line[2] * seen[2]) / (across * length);
     for (int c = 0; damping && c < plan->dimension; c++)
         approach += (motion_of(n, i, c) - (wall_at ? 0.0 : motion_of(n, j, c))) * line[c] / across;
     if (damping)

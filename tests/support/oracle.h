@@ -8,7 +8,7 @@
 #ifndef ASCC_ORACLE_H
 #define ASCC_ORACLE_H
 
-#include "model.h"
+#include "model/model.h"
 
 /* What stays as it was in an earlier, recorded rollout: gradients do not flow through it. */
 typedef enum oracle_mode {

@@ -13,7 +13,7 @@
 
 #include <cmocka.h>
 
-#include "neighbors.h"
+#include "points/neighbors.h"
 
 typedef struct test_tools {
     ascc_context *context;

@@ -104,8 +104,7 @@ static void turn_strengths(const pair_job *job, size_t i, batch *b, double d[3][
     displacements(job->rows, NULL, i, b, seen, seen_square);
     for (size_t k = 0; k < b->count; k++) {
         const double lengths = sqrt(seen_square[k] * square[k]);
-        const double along =
-            d[0][k] * seen[0][k] + d[1][k] * seen[1][k] + d[2][k] * seen[2][k];
+        const double along = d[0][k] * seen[0][k] + d[1][k] * seen[1][k] + d[2][k] * seen[2][k];
         b->strength[k] *= lengths > 0.0 ? (float)(along / lengths) : 0.0f;
     }
 }
@@ -209,8 +208,8 @@ static void evaluate_kernel(const pair_job *job, size_t i, batch *b)
     const ascc_filter *filter = &plan->output.filter;
     const size_t d = (size_t)plan->dimension, a = ascc_padded(plan->output.inputs);
     const float *value = output_values(run);
-    const ascc_geometry g =
-        ascc_network_geometry(run, job->rows, filter, i, b->neighbor, fill_up(b), b->geometry, BATCH);
+    const ascc_geometry g = ascc_network_geometry(run, job->rows, filter, i, b->neighbor,
+                                                  fill_up(b), b->geometry, BATCH);
     for (int part = 0; part <= ASCC_PART_DAMPING; part++)
         if (job->share[part])
             kernels->pair_strengths(g.pairs.distance, b->neighbor, b->count,
@@ -353,10 +352,10 @@ static void flush_walls(pair_job *job, size_t i, const size_t *wall, batch *b)
                                                   b->neighbor, b->count, b->geometry, BATCH);
     for (int part = ASCC_PART_WALL; part <= ASCC_PART_WALL_DAMPING; part++)
         if (job->share[part])
-            run->tools->kernels->pair_strengths(
-                g.pairs.distance, nobody, b->count, job->share[part] + i * ASCC_MAX_BUMPS, nothing,
-                (size_t)plan->output.walls.filter.bumps,
-                part == ASCC_PART_WALL ? b->strength : b->damping);
+            run->tools->kernels->pair_strengths(g.pairs.distance, nobody, b->count,
+                                                job->share[part] + i * ASCC_MAX_BUMPS, nothing,
+                                                (size_t)plan->output.walls.filter.bumps,
+                                                part == ASCC_PART_WALL ? b->strength : b->damping);
     displacements(job->rows, NULL, i, b, t, square);
     point_strengths(job, i, b, job->share[ASCC_PART_WALL_DAMPING] != NULL, false, square, t);
     bool good = true;

@@ -6,7 +6,7 @@
 #include <float.h>
 #include <math.h>
 
-#include "context.h"
+#include "base/context.h"
 
 struct ascc_particles {
     uint32_t magic;

@@ -12,9 +12,13 @@
 ascc_status ascc_plan_open(const ascc_allocator *allocator, const ascc_safetensors *file,
                            ascc_plan_builder *builder, ascc_message *message)
 {
-    *builder = (ascc_plan_builder){
-        .allocator = *allocator, .file = file, .message = message, .output_tensor = -1,
-                                   .damping_tensor = -1, .wall_tensor = -1, .wall_damping_tensor = -1};
+    *builder = (ascc_plan_builder){.allocator = *allocator,
+                                   .file = file,
+                                   .message = message,
+                                   .output_tensor = -1,
+                                   .damping_tensor = -1,
+                                   .wall_tensor = -1,
+                                   .wall_damping_tensor = -1};
     builder->plan.level_count = 1;
     builder->plan.output.source = -1;
     builder->offset = ascc_allocate(allocator, file->tensor_count, sizeof *builder->offset);
@@ -438,12 +442,14 @@ static ascc_status check_central_parts(ascc_plan_builder *builder, ascc_output *
     const bool damped = names->damping || names->wall_damping;
     const int32_t set = ascc_plan_value_set(builder->layer, own->source);
     if ((own->walls.present || damped || own->current_direction) && set != ASCC_SET_FLUID)
-        return FAIL("output: 'walls', 'damping' and 'direction' need a source on the points 'fluid'");
+        return FAIL(
+            "output: 'walls', 'damping' and 'direction' need a source on the points 'fluid'");
     if (damped && (!own->rectify || ascc_plan_motion(&builder->plan, 0) < 0))
         return FAIL("output: 'damping' needs 'relu' and the feature 'motion'");
     ascc_status status = ASCC_OK;
     if (names->damping)
-        status = check_central(builder, own, &own->filter, names->damping, &builder->damping_tensor);
+        status =
+            check_central(builder, own, &own->filter, names->damping, &builder->damping_tensor);
     if (status != ASCC_OK || !own->walls.present)
         return status;
     status = check_filter(builder, &own->walls.filter, "output 'walls'");

@@ -13,8 +13,8 @@
 
 #include <stdatomic.h>
 
-#include "context.h"
-#include "sort.h"
+#include "base/context.h"
+#include "base/sort.h"
 
 /* How lengths become integers: one unit is 2^exponent metres (or whatever the caller measures in). */
 typedef struct ascc_scale {

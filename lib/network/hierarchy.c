@@ -5,7 +5,7 @@
 #include <math.h>
 #include <string.h>
 
-#include "resample.h"
+#include "points/resample.h"
 
 void ascc_plan_radii(const ascc_plan *plan, double *smallest, double *largest)
 {

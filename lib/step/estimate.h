@@ -3,7 +3,7 @@
 #ifndef ASCC_ESTIMATE_H
 #define ASCC_ESTIMATE_H
 
-#include "network.h"
+#include "network/network.h"
 
 /* Bytes of scratch for one step of this many particles near rest density. */
 size_t ascc_estimate_scratch(const ascc_network *network, size_t fluid, size_t boundary,

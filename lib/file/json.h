@@ -10,7 +10,7 @@
 #ifndef ASCC_JSON_H
 #define ASCC_JSON_H
 
-#include "memory.h"
+#include "base/memory.h"
 
 #define ASCC_JSON_MAX_DEPTH 32
 #define ASCC_JSON_MAX_VALUES ((size_t)1 << 18)

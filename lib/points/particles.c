@@ -12,7 +12,7 @@
  */
 #include "particles.h"
 
-#include "arrays.h"
+#include "base/host_array.h"
 
 #include <float.h>
 #include <math.h>

@@ -1,7 +1,7 @@
 /* The network description of libascc's own model files: JSON text to plan (docs/file-format.md).
  * SPDX-License-Identifier: MIT */
 #include "description.h"
-#include "json_reader.h"
+#include "file/json_reader.h"
 
 #include <string.h>
 
@@ -277,8 +277,8 @@ static void read_central(ascc_reader *reader, uint32_t object, ascc_output *outp
     names->wall_damping = optional_text(reader, walls, "damping");
     read_filter(reader, walls, &output->walls.filter, true);
     if (ascc_reader_has(reader, walls, "contact"))
-        output->walls.contact = ascc_reader_number(reader, walls, "contact", 0.0,
-                                                   output->walls.filter.radius);
+        output->walls.contact =
+            ascc_reader_number(reader, walls, "contact", 0.0, output->walls.filter.radius);
     ascc_reader_end(reader, walls);
     ascc_reader_where(reader, "output");
 }

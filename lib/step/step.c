@@ -6,7 +6,7 @@
 #include <string.h>
 #include <time.h>
 
-#include "arrays.h"
+#include "base/host_array.h"
 #include "contact.h"
 #include "estimate.h"
 
@@ -205,8 +205,7 @@ static double *scaled(const ascc_search_tools *tools, const double *position, si
 static ascc_impulse_scale impulse_scale(const ascc_step *step, const ascc_particles *p)
 {
     const ascc_plan *plan = &step->model->plan;
-    ascc_impulse_scale scale = {
-        .mass = p->mass, .position = p->position};
+    ascc_impulse_scale scale = {.mass = p->mass, .position = p->position};
     for (int c = 0; c < 3; c++)
         scale.factor[c] = plan->output.scale[c] / plan->time_step *
                           (step->time_step / plan->time_step) / step->length_unit / p->quantum;
@@ -349,8 +348,8 @@ ascc_status ascc_step_once(ascc_step *step, ascc_particles *p, const ascc_motion
     double since = now();
     const double begin = since;
     ascc_arena_reset(arena);
-    trace->tools = (ascc_search_tools){arena, step->context->workers, &step->context->kernels,
-                                       &step->message};
+    trace->tools =
+        (ascc_search_tools){arena, step->context->workers, &step->context->kernels, &step->message};
     ascc_advance *advance = &trace->advance;
     ascc_impulses *impulses = &trace->impulses;
     if (!take_advance(advance, impulses, arena, p))
@@ -364,7 +363,8 @@ ascc_status ascc_step_once(ascc_step *step, ascc_particles *p, const ascc_motion
         status =
             ascc_integrate_end(tools->workers, p, motion, impulses->fluid, advance, &step->message);
     if (status == ASCC_OK && p->fluid_count && step->model->plan.output.walls.contact > 0.0)
-        status = ascc_contact(&trace->run, p, motion->time_step, step->length_unit, advance, impulses);
+        status =
+            ascc_contact(&trace->run, p, motion->time_step, step->length_unit, advance, impulses);
     if (status != ASCC_OK)
         return status;
     commit(step, p, advance, impulses);

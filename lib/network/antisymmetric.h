@@ -21,8 +21,8 @@ typedef struct ascc_impulses {
 
 /* From outputs to quanta. */
 typedef struct ascc_impulse_scale {
-    const double *mass; /* of fluid rows, kg */
-    double factor[3];   /* quanta per kg and unit of output */
+    const double *mass;     /* of fluid rows, kg */
+    double factor[3];       /* quanta per kg and unit of output */
     const double *position; /* of fluid rows, before the step */
 } ascc_impulse_scale;
 

@@ -97,8 +97,7 @@ static bool end_at(contact_job *job, size_t row, size_t wall, const double *to)
             return false;
         job->advance->momentum[k] = momentum;
         job->advance->position[k] =
-            p->position[k] +
-            job->time_step * ((double)momentum * p->quantum / p->mass[row]);
+            p->position[k] + job->time_step * ((double)momentum * p->quantum / p->mass[row]);
     }
     return true;
 }

@@ -3,8 +3,8 @@
 #ifndef ASCC_INTEGRATE_H
 #define ASCC_INTEGRATE_H
 
-#include "model.h"
-#include "particles.h"
+#include "model/model.h"
+#include "points/particles.h"
 
 /* What one step does from outside, in the host's units. */
 typedef struct ascc_motion {

@@ -13,13 +13,14 @@
 #ifndef ASCC_CONTACT_H
 #define ASCC_CONTACT_H
 
-#include "antisymmetric.h"
+#include "network/antisymmetric.h"
 #include "integrate.h"
 
 /* After ascc_integrate_end: changes positions and momenta in `advance`, and gives walls[] of `impulses` what the
  * fluid lost. unit: metres in the host's length. Needs plan->output.walls.contact > 0.
  * errors: RANGE; the message names the particle. */
-ascc_status ascc_contact(const ascc_network_run *run, const ascc_particles *particles, double time_step,
-                         double unit, ascc_advance *advance, const ascc_impulses *impulses);
+ascc_status ascc_contact(const ascc_network_run *run, const ascc_particles *particles,
+                         double time_step, double unit, ascc_advance *advance,
+                         const ascc_impulses *impulses);
 
 #endif

@@ -3,7 +3,7 @@
 #ifndef ASCC_STEP_H
 #define ASCC_STEP_H
 
-#include "antisymmetric.h"
+#include "network/antisymmetric.h"
 #include "integrate.h"
 
 struct ascc_step {

@@ -3,8 +3,8 @@
 #ifndef ASCC_HIERARCHY_H
 #define ASCC_HIERARCHY_H
 
-#include "model.h"
-#include "neighbors.h"
+#include "model/model.h"
+#include "points/neighbors.h"
 
 #define ASCC_MAX_GRIDS 64
 
@@ -44,7 +44,8 @@ ascc_status ascc_hierarchy_grid(ascc_hierarchy *hierarchy, const ascc_search_too
 void ascc_plan_radii(const ascc_plan *plan, double *smallest, double *largest);
 
 /* Host's fluid row of a row of fluid, boundary or all, or fluid_count + boundary row. */
-static inline size_t ascc_hierarchy_host_row(const ascc_hierarchy *hierarchy, int32_t set, size_t row)
+static inline size_t ascc_hierarchy_host_row(const ascc_hierarchy *hierarchy, int32_t set,
+                                             size_t row)
 {
     return hierarchy->origin[set == ASCC_SET_ALL ? row : hierarchy->whole[set][row]];
 }

@@ -12,7 +12,7 @@
 #define ASCC_MODEL_H
 
 #include <math.h>
-#include "context.h"
+#include "base/context.h"
 
 #define ASCC_MAX_LEVELS 8
 #define ASCC_MAX_CHANNELS 1024
@@ -71,8 +71,9 @@ typedef struct ascc_term {
     const float
         *bias; /* [outputs] or NULL; added to every row the term reaches, also without neighbours */
     int32_t normalize; /* of a transfer: hats are divided by their sum */
-    int32_t relative;  /* of a convolution of features: motion is taken relative to the query's own */
-    double voxel;       /* of a transfer, m: hats are 0 this far away along any axis */
+    int32_t
+        relative; /* of a convolution of features: motion is taken relative to the query's own */
+    double voxel; /* of a transfer, m: hats are 0 this far away along any axis */
     ascc_filter filter; /* of a convolution or transfer */
 } ascc_term;
 
@@ -97,7 +98,7 @@ typedef enum ascc_output_kind {
 /* Pairs of a fluid particle and a wall, from the fluid particle's values alone. */
 typedef struct ascc_wall_output {
     int32_t present, reserved;
-    ascc_filter filter;           /* a basis */
+    ascc_filter filter;            /* a basis */
     const float *weight, *damping; /* [bump][inputs]; damping or NULL */
     double contact; /* m: no particle comes closer (contact.h); 0 = walls have no contact */
 } ascc_wall_output;
@@ -107,7 +108,7 @@ typedef struct ascc_output {
     int32_t source;
     int32_t rectify;
     int32_t inputs;
-    int32_t radial; /* pair terms projected on the line between the particles */
+    int32_t radial;            /* pair terms projected on the line between the particles */
     int32_t current_direction; /* that line is taken before the step, whatever the network sees */
     ascc_filter filter;
     /* antisymmetric: the whole kernel [z][y][x][inputs][dimension]; with a basis [bump][inputs], whose
@@ -115,7 +116,8 @@ typedef struct ascc_output {
     const float *weight;
     const float *half; /* what `weight` is made of, if half of it is stored; else NULL */
     int32_t half_axis, reserved;
-    const float *damping; /* [bump][inputs], none negative, times the pair's speed of approach; or NULL */
+    const float
+        *damping; /* [bump][inputs], none negative, times the pair's speed of approach; or NULL */
     ascc_wall_output walls;
     double scale[3]; /* metres of position correction in one time step per unit of output */
     double limit;    /* of a basis: the greatest such correction by one pair, m; 0 = none */
@@ -132,7 +134,7 @@ typedef enum ascc_feature {
     ASCC_FEATURE_VELOCITY, /* fluid: after external forces, m/s; dimension channels */
     ASCC_FEATURE_NORMAL,   /* boundary; dimension channels */
     ASCC_FEATURE_MOTION,   /* velocity in spacings a time step; walls 0; dimension channels */
-    ASCC_FEATURE_GRAVITY,  /* fluid: the step's, in spacings a squared time step; dimension channels */
+    ASCC_FEATURE_GRAVITY, /* fluid: the step's, in spacings a squared time step; dimension channels */
 } ascc_feature;
 #define ASCC_MAX_FEATURES 8
 

@@ -263,7 +263,7 @@ static bool take_active(ascc_network_run *run)
 }
 
 bool ascc_network_shared_row(const ascc_hierarchy *h, int32_t from, int32_t to, size_t row,
-                       size_t *shared)
+                             size_t *shared)
 {
     *shared = row;
     if (from == to)
@@ -523,8 +523,8 @@ void ascc_network_column(const ascc_network_run *run, const ascc_term *term, con
         feature = scratch->relative;
         read = scratch->sequence;
     }
-    const ascc_geometry g = ascc_network_geometry(run, rows, filter, row, neighbor, count,
-                                                  scratch->geometry, room);
+    const ascc_geometry g =
+        ascc_network_geometry(run, rows, filter, row, neighbor, count, scratch->geometry, room);
     if (term->kind == ASCC_TERM_TRANSFER) {
         float *hat = g.pairs.window[ASCC_WINDOW_HAT];
         if (term->normalize)
@@ -613,8 +613,7 @@ static void compute_tiles(void *data, size_t begin, size_t end, int32_t slot)
             const ascc_term *term = &plan->term[t];
             const int32_t key = job->run->network->term_key[t];
             if (key >= 0)
-                convolve_tile(job, term, &job->run->rows[key], list, n, column, tile,
-                              &scratch);
+                convolve_tile(job, term, &job->run->rows[key], list, n, column, tile, &scratch);
             else
                 pointwise_tile(job, term, list, n, tile);
         }

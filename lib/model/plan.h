@@ -9,7 +9,7 @@
 #define ASCC_PLAN_H
 
 #include "model.h"
-#include "safetensors.h"
+#include "file/safetensors.h"
 
 #define ASCC_MAX_LAYERS 256
 #define ASCC_MAX_TERMS 2048

@@ -1,7 +1,7 @@
 /* The published pretrained networks, converted to safetensors but otherwise as they are.
  * SPDX-License-Identifier: MIT */
 #include "published.h"
-#include "json_reader.h"
+#include "file/json_reader.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -260,8 +260,8 @@ static void finish_output(published *p, const ascc_output *output, const char *k
                           int32_t storage)
 {
     if (p->reader.status == ASCC_OK)
-        p->reader.status = ascc_plan_set_output(
-            p->builder, output, &(ascc_output_names){.weight = kernel}, storage);
+        p->reader.status = ascc_plan_set_output(p->builder, output,
+                                                &(ascc_output_names){.weight = kernel}, storage);
 }
 
 static void begin_layers(published *p)

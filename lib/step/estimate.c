@@ -152,7 +152,7 @@ size_t ascc_estimate_scratch(const ascc_network *network, size_t fluid, size_t b
     const double forward =
         features + all * 4.0 + (double)threads * layer_bytes(plan, 1.5 * longest);
     const bool direct = !plan->output.filter.bumps && !plan->output.radial; /* sums of four */
-    double shares = plan->output.current_direction ? 24.0 : 0.0; /* and places */
+    double shares = plan->output.current_direction ? 24.0 : 0.0;            /* and places */
     for (int part = 0; part < ASCC_PARTS && plan->output.filter.bumps; part++)
         shares += network->part_weight[part] ? 32.0 : 0.0;
     const double last = all * (direct ? 41.0 : 9.0 + shares + 8.0 * d);
