@@ -10,7 +10,9 @@
 #include <string.h>
 
 #include "../tests/support/model_builder.h"
-#include "network/antisymmetric.h"
+#include "network/column.h"
+#include "model/model.h"
+#include "network/pair_sum.h"
 #include "bench.h"
 
 #define BATCH 64
@@ -49,7 +51,7 @@ static void run_network(bench_pairs *p)
     const ascc_scene scene = {.fluid_count = p->count, .fluid = x};
     p->tools.arena = &p->scene_arena;
     check(p, ascc_hierarchy_build(&p->hierarchy, &p->tools, &p->model->plan, &scene));
-    check(p, ascc_network_demand(&p->run, &p->network, &p->hierarchy, &p->tools));
+    check(p, ascc_network_demand(&p->run, &p->network, &p->hierarchy, &p->tools, NULL));
     check(p, ascc_network_forward(&p->run, features, features));
     p->tools.arena = &p->arena; /* what the layer takes is given back each time */
     free(features);
@@ -77,8 +79,8 @@ bench_pairs *bench_pairs_open(size_t count, uint32_t cpu)
     ascc_arena_open(&p->arena, &p->context->allocator);
     p->tools = (ascc_search_tools){&p->scene_arena, p->context->workers, &p->context->kernels,
                                    &p->message};
-    check(p, ascc_network_create(&p->network, &p->context->allocator, &p->model->plan, 4096,
-                                 &p->message));
+    check(p, ascc_network_create(&p->network, &p->context->allocator, &p->model->plan,
+                                 &p->model->packed, 4096, &p->message));
     p->mass = malloc(count * sizeof *p->mass);
     p->impulse = malloc(count * 3 * sizeof *p->impulse);
     p->sum = malloc(count * 3 * sizeof *p->sum);
@@ -97,7 +99,8 @@ void bench_pairs_exact(void *data)
     const ascc_impulse_scale scale = {.mass = p->mass, .factor = {1e6, 1e6, 1e6}};
     const ascc_impulses impulses = {.fluid = p->impulse};
     ascc_arena_reset(&p->arena);
-    check(p, ascc_antisymmetric_impulses(&p->run, &scale, &impulses, &p->pair_count));
+    check(p, p->model->plan.output.term.operation->impulses(&p->run, &scale, &impulses,
+                                                            &p->pair_count));
 }
 
 /* One batch of the twin, its geometry filled up to whole vectors as the library's. */
@@ -106,16 +109,15 @@ static void flush(bench_pairs *p, const ascc_rows *rows, size_t i, uint32_t *nei
     size_t filled = count;
     for (; filled % 8; filled++)
         neighbor[filled] = neighbor[0];
-    const ascc_plan *plan = p->network.plan;
-    const ascc_value *source = &p->run.value[plan->output.source];
-    const float *value = plan->output.rectify ? source->rectified : source->raw;
-    const size_t a = ascc_padded(plan->output.inputs);
+    const ascc_term *output = &p->network.plan->output.term;
+    const float *value = ascc_term_source(&p->run, output);
+    const size_t a = ascc_padded(output->inputs);
     float geometry[ASCC_GEOMETRY_ARRAYS * BATCH], term[BATCH][4];
-    const ascc_geometry g = ascc_network_geometry(&p->run, rows, &plan->output.filter, i, neighbor,
-                                                  filled, geometry, BATCH);
+    const ascc_geometry g =
+        ascc_geometry_of(&p->run, rows, &output->filter, i, neighbor, filled, geometry, BATCH);
     p->tools.kernels->pair_terms(&g.pairs, g.window, neighbor, count, value + i * a, value, a,
-                                 plan->output.filter.cells,
-                                 p->network.term_weight[plan->term_count], 3, term[0]);
+                                 output->filter.cells, ascc_term_packed(&p->run, output), 3,
+                                 term[0]);
     for (size_t k = 0; k < count; k++)
         for (size_t c = 0; c < 3; c++) {
             const float impulse = term[k][c] * 1e6f;
@@ -127,7 +129,7 @@ static void flush(bench_pairs *p, const ascc_rows *rows, size_t i, uint32_t *nei
 void bench_pairs_float(void *data)
 {
     bench_pairs *p = data;
-    const ascc_rows *rows = &p->run.rows[p->network.term_key[p->network.plan->term_count]];
+    const ascc_rows *rows = ascc_term_list(&p->run, &p->network.plan->output.term, 0);
     memset(p->sum, 0, p->count * 3 * sizeof *p->sum);
     for (size_t i = 0; i < p->count; i++) {
         uint32_t batch[BATCH];

@@ -14,6 +14,8 @@
 #include "../examples/demo_model.h"
 #include "../tests/support/model_builder.h"
 #include "bench.h"
+#include "model/model.h"
+#include "network/operations.h"
 
 typedef struct subject {
     ascc_context *context;
@@ -204,32 +206,31 @@ static double term_flops(const ascc_network_run *run, const ascc_term *term, int
 {
     const double in = (double)term->inputs, out = (double)term->outputs;
     const int32_t *c = term->filter.cells;
-    const double corners = c[2] > 1 ? 8.0 : 4.0, cells = (double)c[0] * c[1] * c[2];
+    const double corners = c[2] > 1 ? 8.0 : 4.0, cells = (double)ascc_cell_count(&term->filter);
     double rows = 0.0, pairs = 0.0;
     for (size_t i = 0; i < count; i++)
         if (active[i]) {
             rows += 1.0;
             pairs += key >= 0 ? (double)run->rows[key].count[i] : 0.0;
         }
-    if (ascc_term_searches(term) && (term->filter.bumps || term->kind == ASCC_TERM_TRANSFER))
-        return 2.0 * cells * in * pairs + 2.0 * cells * in * out * rows;
-    if (term->kind == ASCC_TERM_CONVOLUTION)
-        return 2.0 * corners * in * pairs + 2.0 * cells * in * out * rows;
-    return term->kind == ASCC_TERM_DENSE ? 2.0 * in * out * rows : 0.0;
+    const double reached = term->operation == &ascc_op_grid ? corners : cells;
+    return term->tensor[ASCC_TENSOR_WEIGHT]
+               ? 2.0 * reached * in * pairs + 2.0 * cells * in * out * rows
+               : 0.0;
 }
 
 static double network_flops(const subject *s, const ascc_network_run *run)
 {
     const ascc_plan *plan = &s->model->plan;
-    const double d = plan->dimension, in = plan->output.inputs, corners = d > 2.0 ? 8.0 : 4.0;
+    const double d = plan->dimension, in = plan->output.term.inputs, corners = d > 2.0 ? 8.0 : 4.0;
     double flops = 0.0;
     for (int32_t l = 0; l < plan->layer_count; l++) {
         const ascc_layer *layer = &plan->layer[l];
         for (int32_t t = layer->first_term; t < layer->first_term + layer->term_count; t++)
-            flops += term_flops(run, &plan->term[t], run->network->term_key[t],
+            flops += term_flops(run, &plan->term[t], run->network->term_key[t][0],
                                 run->value[l + 2].active, run->hierarchy->set[layer->set].count);
     }
-    const double bumps = plan->output.filter.bumps;
+    const double bumps = plan->output.term.filter.bumps;
     if (bumps > 0.0)
         return flops + (double)s->last.pair_count * 3.0 * bumps;
     return flops + (double)s->last.pair_count * in * (2.0 * corners * d + 1.0 + 2.0 * d);
@@ -254,9 +255,10 @@ static double count_flops(const subject *s)
         (s->walls &&
          ascc_particles_get(s->particles, ASCC_BOUNDARY, ASCC_POSITION, 0, s->walls, &wall)))
         bench_fail("no positions");
-    if (ascc_network_create(&network, &s->context->allocator, &s->model->plan, 4096, &message) ||
+    if (ascc_network_create(&network, &s->context->allocator, &s->model->plan, &s->model->packed,
+                            4096, &message) ||
         ascc_hierarchy_build(&hierarchy, &tools, &s->model->plan, &scene) ||
-        ascc_network_demand(&run, &network, &hierarchy, &tools))
+        ascc_network_demand(&run, &network, &hierarchy, &tools, NULL))
         bench_fail("%s", message.text);
     const double flops = network_flops(s, &run);
     ascc_network_destroy(&network);
@@ -267,7 +269,18 @@ static double count_flops(const subject *s)
 
 /* ---- bench step ---- */
 
-enum { TOTAL, PREPARE, HIERARCHY, SEARCH, NETWORK, LAST, COMMIT, PHASES };
+/* The whole step, then its stages. */
+static const char *const phases[] = {"total", "forces",  "sight",   "search", "network",
+                                     "pairs", "advance", "contact", "commit"};
+#define PHASES 9
+
+static double seconds_of_phase(const ascc_step_statistics *s, size_t phase)
+{
+    for (int32_t i = 0; phase > 0 && i < s->stage_count; i++)
+        if (strcmp(s->stage[i].name, phases[phase]) == 0)
+            return s->stage[i].seconds;
+    return phase == 0 ? s->seconds_total : 0.0;
+}
 
 typedef struct step_times {
     bench_spread phase[PHASES], share;
@@ -284,16 +297,12 @@ static step_times time_steps(subject *s, size_t repeats, int32_t threads)
     bench_laps_in_cpu_time = threads == 1;
     for (size_t r = 0; r < repeats; r++) {
         run_step(s);
-        const ascc_step_statistics *l = &s->last;
-        const double phases[PHASES] = {l->seconds_total,  l->seconds_prepare, l->seconds_hierarchy,
-                                       l->seconds_search, l->seconds_network, l->seconds_last_layer,
-                                       l->seconds_commit};
-        for (int p = 0; p < PHASES; p++)
-            seconds[p][r] = phases[p];
-        share[r] = times.flops / phases[TOTAL] * 1e-9 / bench_peak() / threads;
+        for (size_t p = 0; p < PHASES; p++)
+            seconds[p][r] = seconds_of_phase(&s->last, p);
+        share[r] = times.flops / seconds[0][r] * 1e-9 / bench_peak() / threads;
     }
     bench_laps_in_cpu_time = false;
-    for (int p = 0; p < PHASES; p++)
+    for (size_t p = 0; p < PHASES; p++)
         times.phase[p] = bench_spread_of(seconds[p], repeats);
     times.share = bench_spread_of(share, repeats);
     return times;
@@ -310,14 +319,13 @@ static void step_row(const bench_options *b, bench_table *table, const subject_o
     }
     const step_times t = time_steps(s, bench_repeats(b), o->threads);
     const double ns = 1e9 / (double)s->count;
-    bench_row(table,
-              "%s,%s,%d,%zu,%zu,%s,%d,%.1f,%.1f,%.1f,%.1f,%.1f,%.1f,%.1f,%.1f,%.1f,%.2f,%.3f,"
-              "%.1f,%.0f,%lld",
-              o->scene, o->model, s->info.dimension, s->count, s->walls, variant, o->threads,
-              t.phase[TOTAL].median * ns, t.phase[TOTAL].min * ns, t.phase[TOTAL].max * ns,
-              t.phase[PREPARE].median * ns, t.phase[HIERARCHY].median * ns,
-              t.phase[SEARCH].median * ns, t.phase[NETWORK].median * ns, t.phase[LAST].median * ns,
-              t.phase[COMMIT].median * ns, t.flops / t.phase[TOTAL].median * 1e-9, t.share.median,
+    char stages[256] = "";
+    for (size_t p = 1, at = 0; p < PHASES; p++)
+        at += (size_t)snprintf(stages + at, sizeof stages - at, "%.1f,", t.phase[p].median * ns);
+    bench_row(table, "%s,%s,%d,%zu,%zu,%s,%d,%.1f,%.1f,%.1f,%s%.2f,%.3f,%.1f,%.0f,%lld", o->scene,
+              o->model, s->info.dimension, s->count, s->walls, variant, o->threads,
+              t.phase[0].median * ns, t.phase[0].min * ns, t.phase[0].max * ns, stages,
+              t.flops / t.phase[0].median * 1e-9, t.share.median,
               (double)s->last.neighbor_count / (double)s->count,
               (double)s->last.scratch_size / (double)s->count, (long long)s->drift);
     close_subject(s);
@@ -325,8 +333,8 @@ static void step_row(const bench_options *b, bench_table *table, const subject_o
 }
 
 static const char step_columns[] =
-    "scene,model,dimension,particles,walls,variant,threads,ns_per_particle,min,max,prepare,"
-    "hierarchy,search,network,last_layer,commit,gflops,peak_share,neighbours_per_particle,"
+    "scene,model,dimension,particles,walls,variant,threads,ns_per_particle,min,max,forces,"
+    "sight,search,network,pairs,advance,contact,commit,gflops,peak_share,neighbours_per_particle,"
     "scratch_bytes_per_particle,momentum_drift_quanta";
 static const char step_note[] =
     "ns per particle by phase; CPU time on one thread, wall-clock on more; drift is exact";
@@ -480,7 +488,7 @@ static void scale_row(const bench_options *o, bench_table *table, const char *mo
     const step_times t = time_steps(&s, bench_repeats(o), 1);
     const double ns = 1e9 / (double)s.count;
     bench_row(table, "%s-%dd,%zu,%.1f,%.1f,%.1f,%.0f,%.1f,%lld", model, s.info.dimension, s.count,
-              t.phase[TOTAL].median * ns, t.phase[TOTAL].min * ns, t.phase[TOTAL].max * ns,
+              t.phase[0].median * ns, t.phase[0].min * ns, t.phase[0].max * ns,
               (double)s.last.scratch_size / (double)s.count,
               (double)s.last.scratch_size / 1048576.0, (long long)s.drift);
     close_subject(&s);

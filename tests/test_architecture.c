@@ -11,7 +11,8 @@
 #include <cmocka.h>
 
 #include "architecture.h"
-#include "cost.h"
+#include "model/cost.h"
+#include "model/model.h"
 
 static ascc_architecture some(int32_t dimension, ascc_architecture_family kernel)
 {
@@ -77,7 +78,7 @@ static void test_every_variant_loads(void **state)
                         a.contact = 0.4;
                     }
                     for (int sampling = 0; sampling < 3; sampling++) {
-                        a.sampling = (ascc_sampling)sampling;
+                        a.sampling = (ascc_architecture_sampling)sampling;
                         loads(context, &a);
                     }
                 }

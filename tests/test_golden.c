@@ -2,7 +2,9 @@
  * SPDX-License-Identifier: MIT */
 #include <math.h>
 
-#include "network/antisymmetric.h"
+#include "network/operations.h"
+#include "model/model.h"
+#include "network/pair_sum.h"
 #include "points/resample.h"
 #include "support/golden.h"
 
@@ -118,7 +120,7 @@ static small_case small_open(golden *g, const char *name)
                    : strstr(mapping, "radial") == mapping + 13 ? ASCC_MAPPING_RADIAL
                                                                : ASCC_MAPPING_VOLUME,
         .skip_self = strncmp(behind(text, "\"ignore_query_point\""), "true", 4) == 0};
-    s.term = (ascc_term){.kind = ASCC_TERM_CONVOLUTION,
+    s.term = (ascc_term){.operation = &ascc_op_grid,
                          .source = 1,
                          .inputs = (int32_t)whole[3],
                          .outputs = (int32_t)whole[4],
@@ -147,31 +149,38 @@ static void run_small(small_case *s, test_tools *t, double *got)
     ascc_plan *p = &s->plan;
     p->fluid_channels = s->antisymmetric ? a : 1;
     p->boundary_channels = s->antisymmetric ? 1 : a;
-    s->term.weight = s->kernel;
+    s->term.tensor[ASCC_TENSOR_WEIGHT] = s->kernel;
     if (s->antisymmetric) {
-        p->output = (ascc_output){.kind = ASCC_OUTPUT_ANTISYMMETRIC,
-                                  .inputs = a,
-                                  .filter = s->term.filter,
-                                  .weight = s->kernel,
+        p->output = (ascc_output){.term = {.operation = &ascc_op_pairs_grid,
+                                           .inputs = a,
+                                           .outputs = b,
+                                           .filter = s->term.filter,
+                                           .tensor = {s->kernel}},
+                                  .conserves = 1,
+                                  .half_axis = -1,
                                   .scale = {1.0, 1.0, 1.0}};
     } else {
         s->layer = (ascc_layer){.set = ASCC_SET_FLUID, .channels = b, .term_count = 1};
         p->layer = &s->layer;
         p->term = &s->term;
         p->layer_count = p->term_count = 1;
-        p->output = (ascc_output){.kind = ASCC_OUTPUT_PLAIN, .source = 2, .inputs = b};
+        p->output.term =
+            (ascc_term){.operation = &ascc_op_plain, .source = 2, .inputs = b, .outputs = b};
     }
     const ascc_scene scene = {.fluid_count = s->query_count,
                               .boundary_count = s->antisymmetric ? 0 : s->point_count,
                               .fluid = s->queries,
                               .boundary = s->points};
+    ascc_packed packed;
     ascc_network network;
     ascc_hierarchy h;
     ascc_network_run run;
-    assert_int_equal(ascc_network_create(&network, &t->context->allocator, p, 4096, &t->message),
-                     ASCC_OK);
+    assert_int_equal(ascc_packed_create(&packed, &t->context->allocator, p, &t->message), ASCC_OK);
+    assert_int_equal(
+        ascc_network_create(&network, &t->context->allocator, p, &packed, 4096, &t->message),
+        ASCC_OK);
     assert_int_equal(ascc_hierarchy_build(&h, &t->search, p, &scene), ASCC_OK);
-    assert_int_equal(ascc_network_demand(&run, &network, &h, &t->search), ASCC_OK);
+    assert_int_equal(ascc_network_demand(&run, &network, &h, &t->search, NULL), ASCC_OK);
     assert_int_equal(ascc_network_forward(&run, s->antisymmetric ? s->feature : zeros,
                                           s->antisymmetric ? zeros : s->feature),
                      ASCC_OK);
@@ -185,7 +194,7 @@ static void run_small(small_case *s, test_tools *t, double *got)
                                           .factor = {1.0 / unit, 1.0 / unit, 1.0 / unit}};
         const ascc_impulses impulses = {impulse, NULL};
         uint64_t pairs;
-        assert_int_equal(ascc_antisymmetric_impulses(&run, &scale, &impulses, &pairs), ASCC_OK);
+        assert_int_equal(ascc_op_pairs_grid.impulses(&run, &scale, &impulses, &pairs), ASCC_OK);
         int64_t sum[3] = {0};
         for (size_t i = 0; i < s->query_count * 3; i++) {
             got[i] = (double)impulse[i] * unit;
@@ -203,6 +212,7 @@ static void run_small(small_case *s, test_tools *t, double *got)
         }
     }
     ascc_network_destroy(&network);
+    ascc_packed_destroy(&packed, &t->context->allocator);
     free(zeros);
 }
 
@@ -351,10 +361,11 @@ static void run_layers(network_case *n, test_tools *t, ascc_network *network, as
                               : c == 0 ? 1.0f
                                        : (float)n->normal[i * 3 + c - 1];
     const ascc_scene scene = {n->fluid_count, n->wall_count, x, n->wall};
-    assert_int_equal(ascc_network_create(network, &t->context->allocator, p, 8192, &t->message),
+    assert_int_equal(ascc_network_create(network, &t->context->allocator, p, &n->model->packed,
+                                         8192, &t->message),
                      ASCC_OK);
     assert_int_equal(ascc_hierarchy_build(h, &t->search, p, &scene), ASCC_OK);
-    assert_int_equal(ascc_network_demand(run, network, h, &t->search), ASCC_OK);
+    assert_int_equal(ascc_network_demand(run, network, h, &t->search, NULL), ASCC_OK);
     assert_int_equal(ascc_network_forward(run, fluid, wall), ASCC_OK);
     free(x);
     free(v);

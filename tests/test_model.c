@@ -13,6 +13,8 @@
 #include <math.h>
 
 #include "model/model.h"
+#include "network/column.h"
+#include "network/operations.h"
 #include "support/failing_allocator.h"
 #include "support/model_builder.h"
 
@@ -63,12 +65,34 @@ static void must_refuse(const char *what, unsigned char *bytes, size_t size, con
     assert_null(model);
 }
 
+static bool is_convolution(const ascc_term *term)
+{
+    return term->operation == &ascc_op_grid || term->operation == &ascc_op_basis;
+}
+
 static void must_have(const ascc_model *model, const float *weights, size_t count)
 {
     const uintptr_t begin = (uintptr_t)model->weights;
     assert_true((uintptr_t)weights >= begin);
     assert_true((uintptr_t)(weights + count) <= begin + model->weight_count * sizeof(float));
     assert_int_equal((uintptr_t)weights % ASCC_ALIGNMENT, 0);
+}
+
+/* The whole kernel of an antisymmetric output as kernels read it, [cell][dimension][padded inputs]. */
+static const float *packed_kernel(const ascc_model *model)
+{
+    return model->packed.term[model->plan.term_count];
+}
+
+static void check_packed_kernel(const ascc_model *model)
+{
+    const ascc_term *term = &model->plan.output.term;
+    const size_t cells = ascc_cell_count(&term->filter);
+    const size_t values = ascc_padded(term->inputs) * (size_t)model->plan.dimension;
+    const float *kernel = packed_kernel(model);
+    for (size_t c = 0; c < cells; c++)
+        for (size_t v = 0; v < values; v++)
+            assert_true(kernel[c * values + v] == -kernel[(cells - 1 - c) * values + v]);
 }
 
 /* Everything the solver relies on, for any plan. */
@@ -84,33 +108,31 @@ static void check_plan(const ascc_model *model)
             const int32_t *cells = term->filter.cells;
             assert_in_range(term->source, 0, i + 1);
             assert_true(term->column + term->outputs <= layer->channels);
-            if (term->kind == ASCC_TERM_CONVOLUTION)
-                must_have(model, term->weight,
+            if (is_convolution(term))
+                must_have(model, term->tensor[ASCC_TENSOR_WEIGHT],
                           (size_t)(cells[0] * cells[1] * cells[2] * term->inputs * term->outputs));
-            else if (term->kind != ASCC_TERM_IDENTITY)
-                must_have(model, term->weight, (size_t)(term->inputs * term->outputs));
+            else if (term->operation != &ascc_op_identity)
+                must_have(model, term->tensor[ASCC_TENSOR_WEIGHT],
+                          (size_t)(term->inputs * term->outputs));
             else
-                assert_null(term->weight);
-            if (term->bias)
-                must_have(model, term->bias, (size_t)term->outputs);
+                assert_null(term->tensor[ASCC_TENSOR_WEIGHT]);
+            if (term->tensor[ASCC_TENSOR_BIAS])
+                must_have(model, term->tensor[ASCC_TENSOR_BIAS], (size_t)term->outputs);
         }
     }
     const ascc_output *output = &plan->output;
-    if (output->kind != ASCC_OUTPUT_ANTISYMMETRIC)
+    if (!output->conserves)
         return;
-    if (output->filter.bumps) {
-        must_have(model, output->weight, (size_t)(output->filter.bumps * output->inputs));
-        assert_int_equal(output->radial, 1);
+    if (output->term.filter.bumps) {
+        must_have(model, output->term.tensor[ASCC_TENSOR_WEIGHT],
+                  (size_t)(output->term.filter.bumps * output->term.inputs));
+        assert_int_equal(output->central, 1);
         return;
     }
-    const size_t cells =
-        (size_t)(output->filter.cells[0] * output->filter.cells[1] * output->filter.cells[2]);
-    const size_t values = (size_t)(output->inputs * plan->dimension);
-    must_have(model, output->weight, cells * values);
-    for (size_t c = 0; c < cells; c++)
-        for (size_t v = 0; v < values; v++)
-            assert_true(output->weight[c * values + v] ==
-                        -output->weight[(cells - 1 - c) * values + v]);
+    const size_t stored = ascc_cell_count(&output->term.filter) / (output->half_axis < 0 ? 1 : 2);
+    const size_t values = (size_t)output->term.inputs * (size_t)plan->dimension;
+    must_have(model, output->term.tensor[ASCC_TENSOR_WEIGHT], stored * values);
+    check_packed_kernel(model);
 }
 
 /* ---- What loads --------------------------------------------------------------------------------- */
@@ -164,7 +186,7 @@ static void demonstration_models_are_antisymmetric_and_radial(void **state)
             assert_int_equal(info.conserves_momentum, 1);
             assert_int_equal(info.advected, 1);
             /* Central impulses at advected positions: torque about those, not about the current. */
-            assert_int_equal(model->plan.output.radial, 1);
+            assert_int_equal(model->plan.output.central, 1);
             assert_int_equal(info.conserves_angular_momentum, 0);
             assert_true(fabs(info.particle_spacing / spacings[i] - 1.0) < 1e-8);
             assert_true(fabs(info.support_radius / spacings[i] - 2.0) < 1e-8);
@@ -191,7 +213,7 @@ static void halves_are_mirrored_along_each_axis(void **state)
         assert_non_null(half);
         memcpy(half, bytes + size - stored_size * sizeof *half, stored_size * sizeof *half);
         ascc_model *model = must_load(bytes, size);
-        const float *full = model->plan.output.weight;
+        const float *full = packed_kernel(model);
         int shape[3] = {4, 4, 4}; /* x, y, z */
         shape[axis] = 2;
         for (int z = 0; z < 4; z++)
@@ -206,7 +228,8 @@ static void halves_are_mirrored_along_each_axis(void **state)
                     const int cell = (at[2] * shape[1] + at[1]) * shape[0] + at[0];
                     for (size_t v = 0; v < values; v++) {
                         const float stored = half[(size_t)cell * values + v];
-                        const float got = full[(size_t)((z * 4 + y) * 4 + x) * values + v];
+                        const size_t whole = (size_t)((z * 4 + y) * 4 + x);
+                        const float got = full[(whole * 3 + v % 3) * 8 + v / 3];
                         assert_true(got == (upper ? stored : -stored));
                     }
                 }
@@ -256,7 +279,7 @@ static void plan_says_what_the_file_says(void **state)
     assert_int_equal(plan->layer[3].set, ASCC_SET_LEVEL + 1);
 
     const ascc_term *term = &plan->term[plan->layer[0].first_term + 1];
-    assert_int_equal(term->kind, ASCC_TERM_CONVOLUTION);
+    assert_true(is_convolution(term));
     assert_int_equal(term->source, 1);
     assert_int_equal(term->rectify, 0);
     assert_int_equal(term->column, 2);
@@ -273,14 +296,14 @@ static void plan_says_what_the_file_says(void **state)
     assert_int_equal(term->source, 5);
     assert_int_equal(term->rectify, 1);
     assert_true(term->filter.radius == 4.0);
-    assert_int_equal(plan->term[plan->layer[4].first_term + 4].kind, ASCC_TERM_IDENTITY);
-    assert_int_equal(plan->output.kind, ASCC_OUTPUT_ANTISYMMETRIC);
-    assert_int_equal(plan->output.source, 6);
-    assert_int_equal(plan->output.rectify, 1);
-    assert_int_equal(plan->output.radial, 0);
-    assert_int_equal(plan->output.inputs, 8);
-    assert_int_equal(plan->output.filter.window, ASCC_WINDOW_PEAK);
-    assert_int_equal(plan->output.filter.skip_self, 1);
+    assert_ptr_equal(plan->term[plan->layer[4].first_term + 4].operation, &ascc_op_identity);
+    assert_int_equal(plan->output.conserves, 1);
+    assert_int_equal(plan->output.term.source, 6);
+    assert_int_equal(plan->output.term.rectify, 1);
+    assert_int_equal(plan->output.central, 0);
+    assert_int_equal(plan->output.term.inputs, 8);
+    assert_int_equal(plan->output.term.filter.window, ASCC_WINDOW_PEAK);
+    assert_int_equal(plan->output.term.filter.skip_self, 1);
     assert_true(plan->output.scale[0] == 0.005 && plan->output.scale[1] == 0.005 &&
                 plan->output.scale[2] == 0.0);
 
@@ -465,10 +488,10 @@ static void documented_examples_load(void **state)
     assert_int_equal(plan->term[1].filter.bumps, 4);
     assert_int_equal(plan->term[1].filter.cells[0], 3);
     assert_int_equal(plan->term[1].filter.mapping, ASCC_MAPPING_DIRECTION);
-    assert_int_equal(plan->term[2].kind, ASCC_TERM_TRANSFER);
-    assert_int_equal(plan->term[2].normalize, 1);
-    assert_int_equal(plan->term[4].normalize, 0);
-    assert_true(plan->term[4].voxel == 0.04);
+    assert_ptr_equal(plan->term[2].operation, &ascc_op_transfer);
+    assert_int_equal(plan->term[2].option[ASCC_OPTION_NORMALIZE], 1);
+    assert_int_equal(plan->term[4].option[ASCC_OPTION_NORMALIZE], 0);
+    assert_true(plan->term[4].option[ASCC_OPTION_VOXEL] == 0.04);
     assert_true(fabs(plan->term[4].filter.radius - 0.04 * sqrt(2.0)) < 1e-15);
     ascc_model_info info = {.size = sizeof info};
     assert_int_equal(ascc_model_get_info(model, &info), ASCC_OK);
@@ -568,8 +591,8 @@ static void base_network_loads(void **state)
     check_plan(model);
     assert_true(model->plan.output.scale[0] == 0.01 && model->plan.output.scale[1] == 0.02);
     assert_int_equal(model->plan.parameter_count, 54 + 2 + 9 + 40 + 160);
-    assert_null(model->plan.term[1].bias);
-    assert_true(model->plan.term[0].bias[1] == 2.0f);
+    assert_null(model->plan.term[1].tensor[ASCC_TENSOR_BIAS]);
+    assert_true(model->plan.term[0].tensor[ASCC_TENSOR_BIAS][1] == 2.0f);
     ascc_model_destroy(&model);
 }
 
@@ -845,12 +868,14 @@ static void wrong_motions_dampings_and_walls_are_refused_by_name(void **state)
         }
         ascc_model *model = must_load(bytes, size); /* the last: it was right */
         const ascc_output *output = &model->plan.output;
-        must_have(model, output->damping, 8);
-        must_have(model, output->walls.weight, 10);
-        must_have(model, output->walls.damping, 10);
-        assert_true(output->damping[5] == 2.0f && output->walls.damping[9] == 10.0f);
-        assert_true(output->walls.present && output->current_direction);
-        assert_true(model->plan.term[0].relative && model->plan.term[1].relative);
+        must_have(model, output->term.tensor[ASCC_TENSOR_DAMPING], 8);
+        must_have(model, output->term.tensor[ASCC_TENSOR_WALL], 10);
+        must_have(model, output->term.tensor[ASCC_TENSOR_WALL_DAMPING], 10);
+        assert_true(output->term.tensor[ASCC_TENSOR_DAMPING][5] == 2.0f &&
+                    output->term.tensor[ASCC_TENSOR_WALL_DAMPING][9] == 10.0f);
+        assert_true(output->has_walls && output->current_direction);
+        assert_true(model->plan.term[0].option[ASCC_OPTION_RELATIVE] &&
+                    model->plan.term[1].option[ASCC_OPTION_RELATIVE]);
         ascc_model_destroy(&model);
     }
 }
@@ -1055,11 +1080,11 @@ static void small_dmcf_becomes_the_plan_it_describes(void **state)
     }
     /* l2: convolution, dense and residual from branch 0, then the convolution from branch 1. */
     const ascc_term *term = &plan->term[plan->layer[3].first_term];
-    static const ascc_term_kind kinds[] = {ASCC_TERM_CONVOLUTION, ASCC_TERM_CONVOLUTION,
-                                           ASCC_TERM_DENSE, ASCC_TERM_IDENTITY};
+    const ascc_operation *const kinds[] = {&ascc_op_grid, &ascc_op_grid, &ascc_op_dense,
+                                           &ascc_op_identity};
     static const int32_t sources[] = {3, 4, 3, 3}, rectified[] = {1, 1, 1, 0};
     for (int i = 0; i < 4; i++) {
-        assert_int_equal(term[i].kind, kinds[i]);
+        assert_ptr_equal(term[i].operation, kinds[i]);
         assert_int_equal(term[i].source, sources[i]);
         assert_int_equal(term[i].rectify, rectified[i]);
     }
@@ -1067,9 +1092,9 @@ static void small_dmcf_becomes_the_plan_it_describes(void **state)
     assert_int_equal(term[0].filter.skip_self, 0);
     assert_int_equal(term[0].filter.window, ASCC_WINDOW_POLY6);
     assert_int_equal(plan->term[0].rectify, 0);
-    assert_int_equal(plan->output.filter.cells[1], 4);
-    assert_int_equal(plan->output.filter.window, ASCC_WINDOW_PEAK);
-    assert_int_equal(plan->output.radial, 0);
+    assert_int_equal(plan->output.term.filter.cells[1], 4);
+    assert_int_equal(plan->output.term.filter.window, ASCC_WINDOW_PEAK);
+    assert_int_equal(plan->output.central, 0);
     assert_true(plan->output.scale[2] == 0.0078125);
     ascc_model_destroy(&model);
 }
@@ -1092,8 +1117,8 @@ static void small_cconv_becomes_the_plan_it_describes(void **state)
     assert_int_equal(plan->term[1].column, 1);
     assert_int_equal(plan->layer[2].term_count, 3);
     assert_int_equal(plan->term[0].filter.skip_self, 1);
-    assert_int_equal(plan->output.kind, ASCC_OUTPUT_PLAIN);
-    assert_int_equal(plan->output.source, 5);
+    assert_int_equal(plan->output.conserves, 0);
+    assert_int_equal(plan->output.term.source, 5);
     ascc_model_info info = {.size = sizeof info};
     assert_int_equal(ascc_model_get_info(model, &info), ASCC_OK);
     assert_int_equal(info.conserves_momentum, 0);

@@ -2,7 +2,9 @@
  * SPDX-License-Identifier: MIT */
 #include <math.h>
 
-#include "network/network.h"
+#include "network/column.h"
+#include "model/model.h"
+#include "network/operations.h"
 #include "support/model_builder.h"
 #include "support/tools.h"
 
@@ -68,11 +70,12 @@ static void open_case(network_case *c, const model_random *random, bool forward)
     float *wall_in = features(&d, walls * (size_t)plan->boundary_channels);
     const ascc_scene scene = {c->fluid_count, walls, fluid, boundary};
     ascc_message message;
-    assert_int_equal(ascc_network_create(&c->network, &c->context->allocator, plan, 4096, &message),
+    assert_int_equal(ascc_network_create(&c->network, &c->context->allocator, plan,
+                                         &c->model->packed, 4096, &message),
                      ASCC_OK);
     assert_int_equal(ascc_hierarchy_build(&c->hierarchy, &c->tools.search, plan, &scene), ASCC_OK);
-    assert_int_equal(ascc_network_demand(&c->run, &c->network, &c->hierarchy, &c->tools.search),
-                     ASCC_OK);
+    assert_int_equal(
+        ascc_network_demand(&c->run, &c->network, &c->hierarchy, &c->tools.search, NULL), ASCC_OK);
     if (forward)
         assert_int_equal(ascc_network_forward(&c->run, in, wall_in), ASCC_OK);
     free(fluid);
@@ -156,26 +159,29 @@ static double term_of(const network_case *c, const ascc_layer *layer, const ascc
     const ascc_hierarchy *h = &c->hierarchy;
     const int dimension = c->model->plan.dimension;
     const int32_t set = ascc_network_set(&c->network, term->source);
-    const double bias = term->bias ? (double)term->bias[column] : 0.0;
+    const double bias =
+        term->tensor[ASCC_TENSOR_BIAS] ? (double)term->tensor[ASCC_TENSOR_BIAS][column] : 0.0;
     double sum = 0.0, hats = 0.0, d[3];
-    if (!ascc_term_searches(term)) {
+    if (!term->operation->lists) {
         size_t j = row;
         if (set != layer->set) { /* fluid or walls into all */
             if ((h->origin[row] < h->fluid_count) != (set == ASCC_SET_FLUID))
                 return 0.0;
             j = h->part[row];
         }
-        return term->kind == ASCC_TERM_IDENTITY ? source_of(c, term, j, column)
-                                                : bias + product(c, term, j, term->weight, column);
+        return term->operation == &ascc_op_identity
+                   ? source_of(c, term, j, column)
+                   : bias + product(c, term, j, term->tensor[ASCC_TENSOR_WEIGHT], column);
     }
     for (size_t j = 0; j < h->set[set].count; j++) {
         const double length = displacement(&h->set[set], j, &h->set[layer->set], row, d);
         const double radius = term->filter.radius * h->scale.inverse;
-        if (term->kind == ASCC_TERM_TRANSFER) {
-            const double hat = hat_of(dimension, d, term->voxel * h->scale.inverse);
+        if (term->operation == &ascc_op_transfer) {
+            const double hat =
+                hat_of(dimension, d, term->option[ASCC_OPTION_VOXEL] * h->scale.inverse);
             hats += hat;
             if (hat > 1e-7) /* at the edge a float may see none, and nobody computes that row */
-                sum += hat * product(c, term, j, term->weight, column);
+                sum += hat * product(c, term, j, term->tensor[ASCC_TENSOR_WEIGHT], column);
             continue;
         }
         if (length > radius)
@@ -184,11 +190,13 @@ static double term_of(const network_case *c, const ascc_layer *layer, const ascc
         for (int32_t m = 0; m < term->filter.bumps * harmonics; m++)
             sum += kernel_of(&term->filter, dimension, m / harmonics, m % harmonics, d, length,
                              radius) *
-                   product(c, term, j, term->weight + m * term->inputs * term->outputs, column);
+                   product(c, term, j,
+                           term->tensor[ASCC_TENSOR_WEIGHT] + m * term->inputs * term->outputs,
+                           column);
     }
-    if (term->normalize && hats > 0.0)
+    if (term->option[ASCC_OPTION_NORMALIZE] != 0.0 && hats > 0.0)
         *slack += 1e-6 / hats;
-    return bias + (term->normalize && hats > 0.0 ? sum / hats : sum);
+    return bias + (term->option[ASCC_OPTION_NORMALIZE] != 0.0 && hats > 0.0 ? sum / hats : sum);
 }
 
 static size_t check_layers(const network_case *c)
@@ -281,9 +289,9 @@ static void prolongation_of_a_linear_field_is_that_field(void **state)
         size_t checked = 0;
         for (int32_t t = 0; t < plan->term_count; t++) {
             const ascc_term *term = &plan->term[t];
-            const int32_t key = c.network.term_key[t];
+            const int32_t key = c.network.term_key[t][0];
             const ascc_rows *rows = &c.run.rows[key < 0 ? 0 : key];
-            if (term->kind != ASCC_TERM_TRANSFER || c.network.key[key].source != ASCC_SET_LEVEL)
+            if (term->operation != &ascc_op_transfer || c.network.key[key].source != ASCC_SET_LEVEL)
                 continue;
             for (size_t i = 0; i < rows->query->count; i++) {
                 if (rows->count[i] == ASCC_ROW_ABSENT)
@@ -291,8 +299,8 @@ static void prolongation_of_a_linear_field_is_that_field(void **state)
                 const uint32_t *neighbor = rows->neighbor + rows->start[i];
                 float scratch[ASCC_GEOMETRY_ARRAYS * 16];
                 assert_true(rows->count[i] <= (dimension == 2 ? 4 : 8));
-                const ascc_geometry g = ascc_network_geometry(
-                    &c.run, rows, &term->filter, i, neighbor, rows->count[i], scratch, 16);
+                const ascc_geometry g = ascc_geometry_of(&c.run, rows, &term->filter, i, neighbor,
+                                                         rows->count[i], scratch, 16);
                 double one = 0.0, offset[3] = {0.0, 0.0, 0.0}, d[3];
                 for (size_t k = 0; k < rows->count[i]; k++) {
                     const double hat = (double)g.window[k];
@@ -300,7 +308,8 @@ static void prolongation_of_a_linear_field_is_that_field(void **state)
                     displacement(rows->source, neighbor[k], rows->query, i, d);
                     one += hat;
                     for (int n = 0; n < dimension; n++)
-                        offset[n] += hat * d[n] / (term->voxel * c.hierarchy.scale.inverse);
+                        offset[n] += hat * d[n] /
+                                     (term->option[ASCC_OPTION_VOXEL] * c.hierarchy.scale.inverse);
                 }
                 /* 1, x, y, z at the lattice's points, in voxels: lattice points are whole units, 1e-8
                  * of a voxel, and the product of three float differences is within 4 of 2^-24. */

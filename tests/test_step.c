@@ -975,8 +975,14 @@ static void statistics_tell_what_happened(void **state)
     assert_true(s.level_points[1] > 0 && s.level_points[1] < s.level_points[0]);
     assert_true(s.max_neighbors > 5 && s.neighbor_count > s.pair_count);
     assert_true(s.scratch_size > 10000);
-    const double sum = s.seconds_prepare + s.seconds_hierarchy + s.seconds_search +
-                       s.seconds_network + s.seconds_last_layer + s.seconds_commit;
+    static const char *const names[] = {"forces", "sight",   "search",  "network",
+                                        "pairs",  "advance", "contact", "commit"};
+    double sum = 0.0;
+    assert_int_equal(s.stage_count, 8);
+    for (int i = 0; i < 8; i++) {
+        assert_string_equal(s.stage[i].name, names[i]);
+        sum += s.stage[i].seconds;
+    }
     assert_true(sum > 0.5 * s.seconds_total && sum <= 1.0001 * s.seconds_total);
     close_world(&w);
 }

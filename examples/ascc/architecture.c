@@ -45,7 +45,7 @@ ascc_architecture ascc_architecture_default(int32_t dimension, ascc_architecture
                                .output = ASCC_OUTPUT_ANTISYMMETRIC,
                                .radial = !basis,
                                .damping = basis,
-                               .sampling = basis ? ASCC_SAMPLING_CORNERS : ASCC_SAMPLING_CENTERS,
+                               .sampling = basis ? ASCC_SAMPLE_CORNERS : ASCC_SAMPLE_CENTERS,
                                .advected = basis};
 }
 
@@ -80,7 +80,7 @@ static void put(bytes *b, const void *from, size_t size)
     b->data[b->length] = '\0';
 }
 
-static void add(bytes *b, const char *format, ...) ASCC_PRINTF(2, 3);
+static void add(bytes *b, const char *format, ...) __attribute__((format(printf, 2, 3)));
 static void add(bytes *b, const char *format, ...)
 {
     char text[512];
@@ -273,7 +273,7 @@ static void add_convolution(writer *w, const convolution *c)
     begin_term(w, "convolution", c->source, c->relu);
     (void)snprintf(name, sizeof name, "%s.kernel", c->name);
     add(&w->network, ",\"kernel\":\"%s\"", name);
-    double size[ASCC_MAX_BUMPS * 9];
+    double size[ASCC_ARCHITECTURE_BUMPS * 9];
     for (size_t i = 0; i < shape[0] * shape[1]; i++)
         size[i] = basis_deviation(&n, i);
     add_tensor(w, name, 4, shape, shape[0] * shape[1], size, false);
@@ -312,7 +312,7 @@ static void add_crossing(writer *w, const crossing *c)
 {
     const size_t shape[2] = {(size_t)c->inputs, (size_t)c->outputs};
     char name[80];
-    if (w->a->sampling == ASCC_SAMPLING_FARTHEST) {
+    if (w->a->sampling == ASCC_SAMPLE_FARTHEST) {
         add_convolution(w, &(convolution){.name = c->name,
                                           .source = c->source,
                                           .relu = c->relu,
@@ -453,7 +453,7 @@ static void go_down(writer *w, int32_t level, const char *source, char last[32])
                                 .source_voxel = voxel_of(a, level - 1),
                                 .hats = (double)(1 << a->dimension),
                                 .relu = true});
-    if (a->sampling == ASCC_SAMPLING_FARTHEST)
+    if (a->sampling == ASCC_SAMPLE_FARTHEST)
         add_wall_convolution(w, name, level, channels, 1.0);
     else if (level == 1)
         add_wall_transfer(w, name, channels);
@@ -766,14 +766,14 @@ static void add_levels(writer *w)
 {
     static const char *const methods[3] = {"voxel_centers", "voxel_corners", "farthest"};
     const ascc_architecture *a = w->a;
-    const bool farthest = a->sampling == ASCC_SAMPLING_FARTHEST;
+    const bool farthest = a->sampling == ASCC_SAMPLE_FARTHEST;
     add(&w->network, ",\"levels\":[");
     for (int32_t level = 1; level <= a->levels; level++)
         add(&w->network, "%s{\"%s\":%.9g}", level > 1 ? "," : "", farthest ? "ratio" : "voxel",
             farthest ? pow(0.5, level * a->dimension) : voxel_of(a, level));
     add(&w->network, "],\"sampling\":{\"method\":\"%s\"%s%s}", methods[a->sampling],
         farthest ? "" : ",\"anchor\":\"world\"",
-        a->sampling == ASCC_SAMPLING_CORNERS ? ",\"hysteresis\":0" : "");
+        a->sampling == ASCC_SAMPLE_CORNERS ? ",\"hysteresis\":0" : "");
 }
 
 static void add_head(writer *w)
@@ -820,8 +820,9 @@ static unsigned char *finish(writer *w, size_t *size)
 
 static const char *basis_fault(const ascc_architecture *a)
 {
-    if (a->bumps < 1 || a->bumps > ASCC_MAX_BUMPS || a->wall_bumps < 1 ||
-        a->wall_bumps > ASCC_MAX_BUMPS || a->order < 0 || a->order > ASCC_MAX_ORDER)
+    if (a->bumps < 1 || a->bumps > ASCC_ARCHITECTURE_BUMPS || a->wall_bumps < 1 ||
+        a->wall_bumps > ASCC_ARCHITECTURE_BUMPS || a->order < 0 ||
+        a->order > ASCC_ARCHITECTURE_ORDER)
         return "there are 1 to 8 bumps and wall_bumps, and orders 0 to 2";
     if (a->radial)
         return "projection is for kernel grid: a basis is central by itself";
@@ -858,14 +859,14 @@ static const char *fault(const ascc_architecture *a)
         return "dimension must be 2 or 3";
     if (!(a->spacing > 0.0) || !(a->time_step > 0.0) || !(a->rest_density > 0.0))
         return "spacing, time_step and rest_density must be positive";
-    if (a->channels < 1 || a->channels > ASCC_MAX_CHANNELS || a->fine_layers < 2 ||
+    if (a->channels < 1 || a->channels > ASCC_ARCHITECTURE_CHANNELS || a->fine_layers < 2 ||
         a->fine_layers > 16)
         return "there are 1 to 1024 channels and 2 to 16 fine_layers";
     if (a->levels < 0 || a->levels > ASCC_ARCHITECTURE_LEVELS || a->coarse_layers < 1 ||
         a->coarse_layers > 16)
         return "there are 0 to 3 levels and 1 to 16 coarse_layers";
     for (int32_t level = 0; level < a->levels; level++)
-        if (a->coarse_channels[level] < 1 || a->coarse_channels[level] > ASCC_MAX_CHANNELS)
+        if (a->coarse_channels[level] < 1 || a->coarse_channels[level] > ASCC_ARCHITECTURE_CHANNELS)
             return "each level has 1 to 1024 coarse_channels";
     if (!(a->radius > 0.0) || !(a->wall_radius > 0.0))
         return "radius and wall_radius must be positive";

@@ -19,14 +19,30 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#include "model/model.h"
+#include <ascc/ascc.h>
 
-enum { ASCC_ARCHITECTURE_LEVELS = 3 };
+enum {
+    ASCC_ARCHITECTURE_LEVELS = 3,
+    ASCC_ARCHITECTURE_BUMPS = 8,
+    ASCC_ARCHITECTURE_ORDER = 2,
+    ASCC_ARCHITECTURE_CHANNELS = 1024
+};
 
 typedef enum ascc_architecture_family {
     ASCC_FAMILY_BASIS,
     ASCC_FAMILY_GRID
 } ascc_architecture_family;
+
+typedef enum ascc_architecture_output {
+    ASCC_OUTPUT_PLAIN,
+    ASCC_OUTPUT_ANTISYMMETRIC
+} ascc_architecture_output;
+
+typedef enum ascc_architecture_sampling {
+    ASCC_SAMPLE_CENTERS,
+    ASCC_SAMPLE_CORNERS,
+    ASCC_SAMPLE_FARTHEST
+} ascc_architecture_sampling;
 
 /* Words of a config file for the members below, each list in the order of its numbers. */
 extern const char *const ascc_architecture_kernels[2];     /* basis, grid */
@@ -54,11 +70,11 @@ typedef struct ascc_architecture {
         contact; /* of BASIS with walls seen: how close the fluid comes to them, spacings; 0 = as close as it gets */
     bool seen_direction; /* of BASIS: pairs act along the line that the network sees */
     int32_t bumps, order, wall_bumps;
-    ascc_output_kind output;
-    bool radial;            /* projection, of GRID only */
-    bool damping;           /* of an antisymmetric BASIS output */
-    ascc_sampling sampling; /* FARTHEST: convolutions in place of transfers */
-    bool advected;          /* where the network sees particles */
+    ascc_architecture_output output;
+    bool radial;                         /* projection, of GRID only */
+    bool damping;                        /* of an antisymmetric BASIS output */
+    ascc_architecture_sampling sampling; /* FARTHEST: convolutions in place of transfers */
+    bool advected;                       /* where the network sees particles */
     uint64_t seed;
 } ascc_architecture;
 

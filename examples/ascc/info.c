@@ -4,20 +4,17 @@
 #include <string.h>
 
 #include "commands.h"
-#include "cost.h"
 #include "host.h"
 
-static void print_model(const char *path, const ascc_model *model, const ascc_model_info *m)
+static void print_model(const char *path, const ascc_model_info *m)
 {
-    const ascc_cost_counts counts = ascc_cost_counts_default(m->dimension);
     printf("%s: model %s\n", path, m->name);
     if (m->description[0])
         printf("  %s\n", m->description);
     printf("  dimension         %d\n", m->dimension);
     printf("  levels, layers    %d, %d\n", m->level_count, m->layer_count);
     printf("  parameters        %llu\n", (unsigned long long)m->parameter_count);
-    printf("  cost              about %.0f multiply-adds a particle and step\n",
-           ascc_cost(&model->plan, &counts));
+    printf("  cost              about %.0f multiply-adds a particle and step\n", m->multiply_adds);
     printf("  conserves         %s\n", m->conserves_angular_momentum ? "momentum, angular momentum"
                                        : m->conserves_momentum       ? "momentum"
                                                                      : "nothing exactly");
@@ -70,7 +67,7 @@ int ascc_command_info(int argc, char **argv)
         ascc_model_info info = {.size = sizeof info};
         status = ascc_model_get_info(model, &info);
         if (status == ASCC_OK)
-            print_model(argv[0], model, &info);
+            print_model(argv[0], &info);
     } else {
         ascc_host_complain(context, "neither a model nor a sequence", status);
         fprintf(stderr, "ascc: read as a sequence: %s\n", error);

@@ -220,7 +220,9 @@ typedef struct simulation {
     double time_step;
     /* Sums over the run. */
     int32_t steps;
-    double seconds[7];
+    double seconds[ASCC_MAX_STAGES], seconds_total;
+    const char *stage[ASCC_MAX_STAGES];
+    int32_t stage_count;
     int64_t drift[3]; /* quanta: what is left of before + external - wall - after */
     ascc_measures first, last;
     double max_density;
@@ -284,11 +286,12 @@ static void count_step(simulation *s)
 {
     ascc_step_statistics t = {.size = sizeof t};
     (void)ascc_step_get_statistics(s->step, &t);
-    const double seconds[7] = {t.seconds_prepare, t.seconds_hierarchy,  t.seconds_search,
-                               t.seconds_network, t.seconds_last_layer, t.seconds_commit,
-                               t.seconds_total};
-    for (int i = 0; i < 7; i++)
-        s->seconds[i] += seconds[i];
+    for (int32_t i = 0; i < t.stage_count; i++) {
+        s->stage[i] = t.stage[i].name;
+        s->seconds[i] += t.stage[i].seconds;
+    }
+    s->stage_count = t.stage_count;
+    s->seconds_total += t.seconds_total;
     for (int c = 0; c < 3; c++)
         s->drift[c] +=
             t.momentum_before[c] + t.external_impulse[c] - t.wall_impulse[c] - t.momentum_after[c];
@@ -364,16 +367,15 @@ static void print_momentum(const simulation *s)
 
 static void print_table(const simulation *s)
 {
-    static const char *const phases[7] = {"prepare",    "hierarchy", "search", "network",
-                                          "last layer", "commit",    "total"};
     const double n = s->steps ? s->steps : 1;
     printf("particles           %zu fluid, %zu boundary\n", s->scene.count, s->scene.walls);
     printf("steps               %d of %g s, %d threads\n", s->steps, s->time_step, s->o->threads);
-    for (int i = 0; i < 7; i++)
-        printf("  %-17s %9.3f ms a step\n", phases[i], 1e3 * s->seconds[i] / n);
+    for (int32_t i = 0; i < s->stage_count; i++)
+        printf("  %-17s %9.3f ms a step\n", s->stage[i], 1e3 * s->seconds[i] / n);
+    printf("  %-17s %9.3f ms a step\n", "total", 1e3 * s->seconds_total / n);
     if (s->scene.count)
         printf("  %-17s %9.3f us a step\n", "per particle",
-               1e6 * s->seconds[6] / n / (double)s->scene.count);
+               1e6 * s->seconds_total / n / (double)s->scene.count);
     print_momentum(s);
     printf("max. density error  %.1f %%  of rest density, over all frames\n",
            100.0 * fmax(0.0, s->max_density - 1.0));

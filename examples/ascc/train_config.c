@@ -177,7 +177,7 @@ static void read_coarse(ascc_reader *r, uint32_t o, ascc_architecture *a)
     a->levels = integer_or(r, o, "levels", 0, ASCC_ARCHITECTURE_LEVELS, 0);
     a->coarse_layers = integer_or(r, o, "coarse_layers", 1, 16, a->coarse_layers);
     if (a->levels || ascc_reader_has(r, o, "coarse_channels"))
-        ascc_reader_numbers(r, o, "coarse_channels", a->levels, 1.0, ASCC_MAX_CHANNELS, channels);
+        ascc_reader_numbers(r, o, "coarse_channels", a->levels, 1.0, ASCC_ARCHITECTURE_CHANNELS, channels);
     for (int32_t i = 0; i < a->levels; i++)
         a->coarse_channels[i] = (int32_t)channels[i];
 }
@@ -203,29 +203,29 @@ static void read_network(reading *g, uint32_t root, int32_t seed, ascc_architect
     if (ascc_reader_has(r, o, "description"))
         text_of(r, o, "description", a->description, sizeof a->description);
     read_scene(r, o, a);
-    a->channels = integer_or(r, o, "channels", 1, ASCC_MAX_CHANNELS, a->channels);
+    a->channels = integer_or(r, o, "channels", 1, ASCC_ARCHITECTURE_CHANNELS, a->channels);
     a->fine_layers = integer_or(r, o, "fine_layers", 2, 16, a->fine_layers);
     read_coarse(r, o, a);
     a->radius = number_or(r, o, "radius", 0.1, 100.0, a->radius);
     a->wall_radius = number_or(r, o, "wall_radius", 0.1, 100.0, a->wall_radius);
-    a->bumps = integer_or(r, o, "bumps", 1, ASCC_MAX_BUMPS, a->bumps);
-    a->order = integer_or(r, o, "order", 0, ASCC_MAX_ORDER, a->order);
-    a->wall_bumps = integer_or(r, o, "wall_bumps", 1, ASCC_MAX_BUMPS, a->wall_bumps);
+    a->bumps = integer_or(r, o, "bumps", 1, ASCC_ARCHITECTURE_BUMPS, a->bumps);
+    a->order = integer_or(r, o, "order", 0, ASCC_ARCHITECTURE_ORDER, a->order);
+    a->wall_bumps = integer_or(r, o, "wall_bumps", 1, ASCC_ARCHITECTURE_BUMPS, a->wall_bumps);
     a->output_radius = number_or(r, o, "output_radius", 0.0, 100.0, a->output_radius);
-    a->output_bumps = integer_or(r, o, "output_bumps", 1, ASCC_MAX_BUMPS, a->output_bumps);
+    a->output_bumps = integer_or(r, o, "output_bumps", 1, ASCC_ARCHITECTURE_BUMPS, a->output_bumps);
     a->gravity_seen = flag_or(r, o, "gravity_seen", false);
     a->impulse_limit = number_or(r, o, "impulse_limit", 0.0, 1e6, 0.0);
     a->contact = number_or(r, o, "contact", 0.0, 100.0, 0.0);
     a->seen_direction =
         choice_or(r, o, "direction", ascc_architecture_directions, 2, a->seen_direction) == 1;
-    a->output = (ascc_output_kind)choice_or(r, o, "output", ascc_architecture_outputs, 2,
-                                            (int32_t)a->output);
+    a->output = (ascc_architecture_output)choice_or(r, o, "output", ascc_architecture_outputs, 2,
+                                                    (int32_t)a->output);
     const bool plain = a->output == ASCC_OUTPUT_PLAIN;
     a->radial =
         choice_or(r, o, "projection", ascc_architecture_projections, 2, a->radial && !plain) == 1;
     a->damping = flag_or(r, o, "damping", a->damping && !plain);
-    a->sampling = (ascc_sampling)choice_or(r, o, "sampling", ascc_architecture_samplings, 3,
-                                           (int32_t)a->sampling);
+    a->sampling = (ascc_architecture_sampling)choice_or(
+        r, o, "sampling", ascc_architecture_samplings, 3, (int32_t)a->sampling);
     a->advected = choice_or(r, o, "evaluate", ascc_architecture_evaluates, 2, a->advected) == 1;
     a->seed = (uint64_t)integer_or(r, o, "seed", 0, INT32_MAX, seed);
     ascc_reader_end(r, o);

@@ -160,6 +160,8 @@ typedef struct ascc_model_info {
     double receptive_radius; /* m: a particle farther away has no influence in one step */
     const char *name;        /* the model's strings, valid as long as it lives */
     const char *description;
+    double time_step_min, time_step_max; /* s: the range of steps that the weights are good for */
+    double multiply_adds; /* of one step for each fluid particle, near the middle of a scene */
 } ascc_model_info;
 
 ASCC_API ascc_status ascc_model_get_info(const ascc_model *model, ascc_model_info *info);
@@ -328,13 +330,14 @@ ASCC_API ascc_status ascc_particles_total_momentum(const ascc_particles *particl
                                                    int64_t total[3]);
 
 /**
- * What the last step gave to a boundary body: equal and opposite to what the body gave the fluid.
+ * What the last ascc_step_run gave to a boundary body over all of its steps: equal and opposite to what the
+ * body gave the fluid.
  *
  * body      as given when its points were added; -1 = all bodies together
  * point     about which the torque is meant, length unit; NULL = the origin
  * impulse   receives quanta, exact; [2] is 0 in 2D. NULL if not wanted.
  * torque    receives kg length^2/s, angular impulse; in 2D only [2] is used. NULL if not wanted.
- * errors    ARGUMENT, RANGE. cost: O(boundary particles). All zero before the first step.
+ * errors    ARGUMENT, RANGE. cost: O(boundary particles). All zero before the first run.
  */
 ASCC_API ascc_status ascc_particles_body_impulse(const ascc_particles *particles, int32_t body,
                                                  const double point[3], int64_t impulse[3],
@@ -395,11 +398,12 @@ typedef struct ascc_step ascc_step;
 /** Options of ascc_step_create. */
 typedef struct ascc_step_options {
     size_t size;        /* sizeof(ascc_step_options) */
-    double time_step;   /* s; 0 = the model's. With another one the learned velocity correction is
-                         * scaled by time_step / the model's, as an acceleration would be. */
+    double time_step;   /* s; 0 = the model's. A longer one than the model was trained for is cut into
+                         * equal substeps; with a shorter one than the model's the learned velocity
+                         * correction is scaled by time_step / the model's, as an acceleration would be. */
     double length_unit; /* metres in one unit of the host's length; 0 = 1. 0.01 for centimetres */
-    double
-        max_displacement;  /* length unit a particle may move in a step, else RANGE; 0 = no bound */
+    double max_displacement; /* length unit a particle may move in a (sub)step, else RANGE; 0 = 64 of the
+                              * model's spacings, INFINITY = no bound */
     int32_t max_neighbors; /* most neighbours of one point before LIMIT is returned; 0 = 4096 */
     int32_t reserved;
 } ascc_step_options;
@@ -408,7 +412,8 @@ typedef struct ascc_step_options {
  * Makes a step. Model and context may be destroyed before it.
  *
  * options   NULL for all defaults; read during the call.
- * errors    ARGUMENT (a value negative or not finite), MEMORY.
+ * errors    ARGUMENT (a value negative or not finite), MEMORY, RANGE (a time_step shorter than the model's
+ *           time_step_min, or longer than 1,000 times its time_step_max).
  */
 ASCC_API ascc_status ascc_step_create(ascc_context *context, const ascc_model *model,
                                       const ascc_step_options *options, ascc_step **step);
@@ -438,7 +443,8 @@ typedef struct ascc_forces {
  * Advances the fluid by `count` time steps (METHOD section 1). Walls do not move.
  *
  * forces    NULL = the model's gravity alone.
- * errors    ARGUMENT, MISMATCH (dimension), MEMORY (scratch had to grow), NOT_FINITE, RANGE, LIMIT.
+ * errors    ARGUMENT, MISMATCH (dimension; a spacing that is not the model's), MEMORY (scratch had to
+ *           grow), NOT_FINITE, RANGE, LIMIT.
  *           Each step is a transaction: on error the set is, bit for bit, as after the last step that
  *           succeeded; ascc_step_statistics says how many did.
  * cost      O(neighbour pairs). Scratch grows to the largest scene seen and is then reused.
@@ -450,26 +456,33 @@ typedef struct ascc_forces {
 ASCC_API ascc_status ascc_step_run(ascc_step *step, ascc_particles *particles,
                                    const ascc_forces *forces, int32_t count);
 
+/** A stage of the step and the time that a run spent in it. */
+typedef struct ascc_stage_time {
+    const char *name; /* the library's, for ever */
+    double seconds;   /* wall clock */
+} ascc_stage_time;
+#define ASCC_MAX_STAGES 24
+
 /** What ascc_step_get_statistics tells of the last ascc_step_run. */
 typedef struct ascc_step_statistics {
     size_t size;         /* sizeof(ascc_step_statistics) */
     int32_t steps;       /* that succeeded in the last run */
     int32_t level_count; /* entries used of level_points */
-    /* Wall-clock seconds of the last step. */
-    double seconds_total;
-    double seconds_prepare;    /* forces, advection, features */
-    double seconds_hierarchy;  /* sorting and sampling the levels */
-    double seconds_search;     /* neighbour rows and interpolation coordinates */
-    double seconds_network;    /* all layers but the last */
-    double seconds_last_layer; /* pair impulses */
-    double seconds_commit;     /* new momenta and positions */
+    int32_t substeps;    /* that each step was cut into */
+    int32_t stage_count; /* entries used of stage */
+    double seconds_total; /* wall clock, of the run */
+    /* By stage, in order: "forces" (and advection), "sight" (features, sorting and sampling of the levels),
+     * "search" (neighbour lists), "network" (all layers but the last), "pairs" (pair impulses), "advance"
+     * (new momenta and positions), "contact", "commit". More may come. */
+    ascc_stage_time stage[ASCC_MAX_STAGES];
+    /* Of the last step: */
     uint64_t level_points[16]; /* points on each level; level 0: fluid and the walls it sees */
     uint64_t pair_count;       /* neighbour pairs of the last layer, unordered */
     uint64_t neighbor_count;   /* entries of all neighbour rows */
     uint64_t max_neighbors;    /* of one point in one row */
     uint64_t scratch_size;     /* bytes the step holds */
-    /* Quanta of momentum, exact; [2] is 0 in 2D. before + external - wall = after, if the model
-     * conserves momentum; else the difference is what its last layer made or lost. */
+    /* Of the run, quanta of momentum, exact; [2] is 0 in 2D. before + external - wall = after, if the
+     * model conserves momentum; else the difference is what its last layer made or lost. */
     int64_t momentum_before[3], momentum_after[3], external_impulse[3], wall_impulse[3];
 } ascc_step_statistics;
 

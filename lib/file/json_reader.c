@@ -157,3 +157,20 @@ void ascc_reader_end(ascc_reader *reader, uint32_t object)
             return;
         }
 }
+
+bool ascc_reader_optional_flag(ascc_reader *reader, uint32_t object, const char *key)
+{
+    return ascc_reader_has(reader, object, key) && ascc_reader_flag(reader, object, key);
+}
+
+int32_t ascc_reader_optional_integer(ascc_reader *reader, uint32_t object, const char *key)
+{
+    return ascc_reader_has(reader, object, key)
+               ? ascc_reader_integer(reader, object, key, 0, INT32_MAX)
+               : 0;
+}
+
+const char *ascc_reader_optional_text(ascc_reader *reader, uint32_t object, const char *key)
+{
+    return ascc_reader_has(reader, object, key) ? ascc_reader_text(reader, object, key) : NULL;
+}

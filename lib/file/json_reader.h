@@ -31,6 +31,10 @@ double ascc_reader_number(ascc_reader *reader, uint32_t object, const char *key,
 int32_t ascc_reader_integer(ascc_reader *reader, uint32_t object, const char *key, int32_t low,
                             int32_t high);
 bool ascc_reader_flag(ascc_reader *reader, uint32_t object, const char *key);
+/* Members that need not be there: false, 0, NULL. */
+bool ascc_reader_optional_flag(ascc_reader *reader, uint32_t object, const char *key);
+int32_t ascc_reader_optional_integer(ascc_reader *reader, uint32_t object, const char *key);
+const char *ascc_reader_optional_text(ascc_reader *reader, uint32_t object, const char *key);
 /* Exactly `count` numbers. */
 void ascc_reader_numbers(ascc_reader *reader, uint32_t object, const char *key, int32_t count,
                          double low, double high, double *numbers);

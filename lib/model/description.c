@@ -1,35 +1,19 @@
 /* The network description of libascc's own model files: JSON text to plan (docs/file-format.md).
  * SPDX-License-Identifier: MIT */
 #include "description.h"
-#include "file/json_reader.h"
 
 #include <string.h>
 
+#include "operation.h"
+
+#define SHORTEST_STEP 0.1 /* of the time step stated */
+#define ASCC_MAX_TYPES 32 /* words that `type` may be */
 #define COUNT(list) ((int32_t)(sizeof(list) / sizeof *(list)))
 
-static const char *const windows[] = {"none", "poly6", "peak"};
-static const char *const mappings[] = {"identity", "radial", "volume"};
 static const char *const evaluations[] = {"current", "advected", "advected_mean"};
 static const char *const features[] = {"one", "velocity", "normal", "motion", "gravity"};
 static const char *const samplings[] = {"voxel_centers", "voxel_corners", "farthest"};
 static const char *const anchors[] = {"world", "centroid"};
-static const char *const term_kinds[] = {"convolution", "dense", "identity", "transfer"};
-static const char *const output_kinds[] = {"plain", "antisymmetric"};
-static const char *const projections[] = {"none", "radial"};
-static const char *const storages[] = {"half", "full"};
-static const char *const axes[] = {"x", "y", "z"};
-
-static bool optional_flag(ascc_reader *reader, uint32_t object, const char *key)
-{
-    return ascc_reader_has(reader, object, key) && ascc_reader_flag(reader, object, key);
-}
-
-static int32_t optional_integer(ascc_reader *reader, uint32_t object, const char *key)
-{
-    return ascc_reader_has(reader, object, key)
-               ? ascc_reader_integer(reader, object, key, 0, INT32_MAX)
-               : 0;
-}
 
 static void read_text(ascc_plan_builder *builder, ascc_reader *reader, uint32_t object,
                       const char *key, char *into, size_t capacity)
@@ -101,6 +85,19 @@ static void read_levels(ascc_reader *reader, uint32_t root, ascc_plan *plan)
     ascc_reader_where(reader, "network");
 }
 
+/* The range of time steps that the weights were trained in; without it only the one stated, but shorter
+ * ones scale like an acceleration. */
+static void read_range(ascc_reader *reader, ascc_plan *plan)
+{
+    double range[2] = {SHORTEST_STEP * plan->time_step, plan->time_step};
+    if (ascc_reader_has(reader, 0, "time_step_range"))
+        ascc_reader_numbers(reader, 0, "time_step_range", 2, ASCC_PLAN_MIN, ASCC_PLAN_MAX, range);
+    if (reader->status == ASCC_OK && !(range[0] <= plan->time_step && plan->time_step <= range[1]))
+        ascc_reader_fail(reader, "'time_step_range' does not hold 'time_step'");
+    plan->time_step_min = range[0];
+    plan->time_step_max = range[1];
+}
+
 static void read_head(ascc_plan_builder *builder, ascc_reader *reader)
 {
     ascc_plan *plan = &builder->plan;
@@ -109,6 +106,7 @@ static void read_head(ascc_plan_builder *builder, ascc_reader *reader)
         read_text(builder, reader, 0, "description", plan->description, sizeof plan->description);
     plan->dimension = ascc_reader_integer(reader, 0, "dimension", 2, 3);
     plan->time_step = ascc_reader_number(reader, 0, "time_step", ASCC_PLAN_MIN, ASCC_PLAN_MAX);
+    read_range(reader, plan);
     ascc_reader_numbers(reader, 0, "gravity", plan->dimension, -ASCC_PLAN_MAX, ASCC_PLAN_MAX,
                         plan->gravity);
     plan->spacing = ascc_reader_number(reader, 0, "particle_spacing", ASCC_PLAN_MIN, ASCC_PLAN_MAX);
@@ -151,49 +149,38 @@ static int32_t read_source(ascc_plan_builder *builder, ascc_reader *reader, uint
     return source;
 }
 
-/* The kernel of a filter: a grid with window and mapping, or a basis. Harmonics have an order only
- * where the kernel is not central. */
-static void read_filter(ascc_reader *reader, uint32_t object, ascc_filter *filter, bool central)
+/* The operation that `type` and the other members of the object mean: of a term, or of an output. */
+static const ascc_operation *read_operation(ascc_reader *reader, uint32_t object, bool output)
 {
-    filter->radius = ascc_reader_number(reader, object, "radius", ASCC_PLAN_MIN, ASCC_PLAN_MAX);
-    if (ascc_reader_has(reader, object, "basis")) {
-        const uint32_t basis = ascc_reader_object(reader, object, "basis");
-        filter->bumps = ascc_reader_integer(reader, basis, "bumps", 1, ASCC_MAX_BUMPS);
-        if (!central)
-            filter->order = ascc_reader_integer(reader, basis, "order", 0, ASCC_MAX_ORDER);
-        ascc_reader_end(reader, basis);
-    } else {
-        filter->window =
-            (ascc_window)ascc_reader_choice(reader, object, "window", windows, COUNT(windows));
-        filter->mapping =
-            (ascc_mapping)ascc_reader_choice(reader, object, "mapping", mappings, COUNT(mappings));
+    const char *types[ASCC_MAX_TYPES] = {NULL};
+    int32_t count = 0;
+    for (const ascc_operation *const *o = ascc_operations; *o; o++) {
+        bool known = !(*o)->impulses == output;
+        for (int32_t i = 0; i < count; i++)
+            known |= strcmp(types[i], (*o)->type) == 0;
+        if (!known && count < ASCC_MAX_TYPES)
+            types[count++] = (*o)->type;
     }
-    filter->neighbor_limit = optional_integer(reader, object, "neighbor_limit");
+    const char *type = types[ascc_reader_choice(reader, object, "type", types, count)];
+    for (const ascc_operation *const *o = ascc_operations; *o; o++)
+        if (!(*o)->impulses != output && strcmp((*o)->type, type) == 0 &&
+            (!(*o)->with || ascc_reader_has(reader, object, (*o)->with)))
+            return *o;
+    ascc_reader_fail(reader, "'%s' lacks what says which kind of it", type);
+    return ascc_operations[0];
 }
 
 static void read_term(ascc_plan_builder *builder, ascc_reader *reader, uint32_t object)
 {
-    ascc_term term = {.kind = (ascc_term_kind)ascc_reader_choice(reader, object, "type", term_kinds,
-                                                                 COUNT(term_kinds))};
-    const char *weight = NULL, *bias = NULL;
+    const char *name[ASCC_MAX_TENSORS] = {NULL};
+    ascc_term term = {.operation = read_operation(reader, object, false)};
     term.source = read_source(builder, reader, object);
-    term.rectify = optional_flag(reader, object, "relu");
-    term.column = optional_integer(reader, object, "column");
-    if (term.kind == ASCC_TERM_CONVOLUTION) {
-        weight = ascc_reader_text(reader, object, "kernel");
-        read_filter(reader, object, &term.filter, false);
-        term.filter.skip_self = optional_flag(reader, object, "skip_self");
-        term.relative = optional_flag(reader, object, "relative");
-    } else if (term.kind != ASCC_TERM_IDENTITY) {
-        weight = ascc_reader_text(reader, object, "weight");
-    }
-    if (term.kind == ASCC_TERM_TRANSFER)
-        term.normalize = optional_flag(reader, object, "normalize");
-    if (weight && ascc_reader_has(reader, object, "bias"))
-        bias = ascc_reader_text(reader, object, "bias");
+    term.rectify = ascc_reader_optional_flag(reader, object, "relu");
+    term.column = ascc_reader_optional_integer(reader, object, "column");
+    term.operation->read(reader, object, &builder->plan, &term, name);
     ascc_reader_end(reader, object);
     if (reader->status == ASCC_OK)
-        reader->status = ascc_plan_add_term(builder, &term, weight, bias);
+        reader->status = ascc_plan_add_term(builder, &term, name);
 }
 
 static void read_layer(ascc_plan_builder *builder, ascc_reader *reader, uint32_t object)
@@ -252,67 +239,23 @@ static void read_scale(ascc_reader *reader, uint32_t object, int32_t dimension, 
         scale[i] = number;
 }
 
-static const char *optional_text(ascc_reader *reader, uint32_t object, const char *key)
-{
-    return ascc_reader_has(reader, object, key) ? ascc_reader_text(reader, object, key) : NULL;
-}
-
-/* What only an output with a basis has. */
-static void read_central(ascc_reader *reader, uint32_t object, ascc_output *output,
-                         ascc_output_names *names)
-{
-    static const char *const directions[] = {"current"};
-    if (ascc_reader_has(reader, object, "direction"))
-        output->current_direction =
-            1 + ascc_reader_choice(reader, object, "direction", directions, COUNT(directions));
-    names->damping = optional_text(reader, object, "damping");
-    if (ascc_reader_has(reader, object, "limit"))
-        output->limit = ascc_reader_number(reader, object, "limit", 1e-30, ASCC_PLAN_MAX);
-    if (!ascc_reader_has(reader, object, "walls"))
-        return;
-    const uint32_t walls = ascc_reader_object(reader, object, "walls");
-    ascc_reader_where(reader, "output 'walls'");
-    output->walls.present = 1;
-    names->wall_weight = ascc_reader_text(reader, walls, "kernel");
-    names->wall_damping = optional_text(reader, walls, "damping");
-    read_filter(reader, walls, &output->walls.filter, true);
-    if (ascc_reader_has(reader, walls, "contact"))
-        output->walls.contact =
-            ascc_reader_number(reader, walls, "contact", 0.0, output->walls.filter.radius);
-    ascc_reader_end(reader, walls);
-    ascc_reader_where(reader, "output");
-}
-
 static void read_output(ascc_plan_builder *builder, ascc_reader *reader)
 {
-    ascc_output output = {.kind = ASCC_OUTPUT_PLAIN};
-    ascc_output_names names = {NULL, NULL, NULL, NULL};
-    int32_t storage = ASCC_FULL;
+    const char *name[ASCC_MAX_TENSORS] = {NULL};
+    ascc_output output = {.half_axis = -1};
     ascc_reader_where(reader, "network");
     const uint32_t object = ascc_reader_object(reader, 0, "output");
     ascc_reader_where(reader, "output");
     if (reader->status != ASCC_OK)
         return;
-    output.kind = (ascc_output_kind)ascc_reader_choice(reader, object, "type", output_kinds,
-                                                       COUNT(output_kinds));
-    output.source = read_source(builder, reader, object);
-    output.rectify = optional_flag(reader, object, "relu");
+    output.term.operation = read_operation(reader, object, true);
+    output.term.source = read_source(builder, reader, object);
+    output.term.rectify = ascc_reader_optional_flag(reader, object, "relu");
     read_scale(reader, object, builder->plan.dimension, output.scale);
-    if (output.kind == ASCC_OUTPUT_ANTISYMMETRIC) {
-        names.weight = ascc_reader_text(reader, object, "kernel");
-        read_filter(reader, object, &output.filter, true);
-        if (output.filter.bumps)
-            read_central(reader, object, &output, &names);
-    }
-    if (output.kind == ASCC_OUTPUT_ANTISYMMETRIC && !output.filter.bumps) {
-        output.radial =
-            ascc_reader_choice(reader, object, "projection", projections, COUNT(projections));
-        if (ascc_reader_choice(reader, object, "stored", storages, COUNT(storages)) == 0)
-            storage = ascc_reader_choice(reader, object, "half_axis", axes, COUNT(axes));
-    }
+    output.term.operation->read(reader, object, &builder->plan, &output.term, name);
     ascc_reader_end(reader, object);
     if (reader->status == ASCC_OK)
-        reader->status = ascc_plan_set_output(builder, &output, &names, storage);
+        reader->status = ascc_plan_set_output(builder, &output, name);
 }
 
 ascc_status ascc_description_read(ascc_plan_builder *builder, const char *text)

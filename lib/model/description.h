@@ -3,7 +3,7 @@
 #ifndef ASCC_DESCRIPTION_H
 #define ASCC_DESCRIPTION_H
 
-#include "plan.h"
+#include "plan_builder.h"
 
 /* Reads the text into an opened builder. errors: FORMAT with the key at fault, MEMORY. */
 ascc_status ascc_description_read(ascc_plan_builder *builder, const char *text);

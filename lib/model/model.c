@@ -1,7 +1,8 @@
 /* A model as a handle: loads, keeps and writes its file. SPDX-License-Identifier: MIT */
 #include "model.h"
+#include "cost.h"
 #include "description.h"
-#include "published.h"
+#include "file/safetensors.h"
 
 #include <stdatomic.h>
 #include <stdio.h>
@@ -29,6 +30,7 @@ static void free_model(ascc_model *model)
 {
     ascc_context *context = model->context;
     const ascc_allocator *allocator = &context->allocator;
+    ascc_packed_destroy(&model->packed, allocator);
     ascc_plan_release(allocator, &model->plan, model->weights, model->weight_count);
     if (model->bytes)
         ascc_release(allocator, model->bytes, model->byte_count, 1);
@@ -66,15 +68,15 @@ static ascc_status read_plan(ascc_safetensors *file, ascc_plan_builder *builder,
         return ascc_fail(message, ASCC_ERROR_FORMAT,
                          "__metadata__ states no '%s': not a model of libascc",
                          format ? "version" : "format");
-    const bool own = strcmp(format, "ascc.model") == 0;
-    if (!own && strcmp(format, "ascc.weights") != 0)
+    if (strcmp(format, "ascc.weights") == 0)
+        return ascc_fail(message, ASCC_ERROR_FORMAT,
+                         "weights as they were published: 'ascc convert' makes a model of them");
+    if (strcmp(format, "ascc.model") != 0)
         return ascc_fail(message, ASCC_ERROR_FORMAT, "format '%s' is not a model's",
                          ascc_quote(format).text);
     if (strcmp(version, "1") != 0)
         return ascc_fail(message, ASCC_ERROR_FORMAT, "version '%s' of %s is not known; 1 is",
                          ascc_quote(version).text, format);
-    if (!own)
-        return ascc_published_read(builder, file);
     const char *network = ascc_safetensors_metadata(file, "network");
     if (!network)
         return ascc_fail(message, ASCC_ERROR_FORMAT, "__metadata__ states no 'network'");
@@ -98,6 +100,8 @@ static ascc_status read_model(ascc_model *model, ascc_message *message)
                 ascc_plan_finish(&builder, &model->plan, &model->weights, &model->weight_count);
         ascc_plan_close(&builder);
     }
+    if (status == ASCC_OK)
+        status = ascc_packed_create(&model->packed, allocator, &model->plan, message);
     ascc_safetensors_close(&file);
     return status;
 }
@@ -240,7 +244,8 @@ ascc_status ascc_model_get_info(const ascc_model *model, ascc_model_info *info)
     if (!alive(model) || !info)
         return ASCC_ERROR_ARGUMENT;
     const ascc_plan *plan = &model->plan;
-    const bool antisymmetric = plan->output.kind == ASCC_OUTPUT_ANTISYMMETRIC;
+    const bool antisymmetric = plan->output.conserves;
+    const ascc_cost_counts counts = ascc_cost_counts_default(plan->dimension);
     const ascc_model_info own = {
         .dimension = plan->dimension,
         .level_count = plan->level_count,
@@ -248,7 +253,7 @@ ascc_status ascc_model_get_info(const ascc_model *model, ascc_model_info *info)
         .conserves_momentum = antisymmetric,
         /* Central impulses at x make no torque about x; at advected positions they do. */
         .conserves_angular_momentum =
-            antisymmetric && plan->output.radial &&
+            antisymmetric && plan->output.central &&
             (plan->advection == ASCC_ADVECT_NONE || plan->output.current_direction),
         .advected = plan->advection != ASCC_ADVECT_NONE,
         .neighbor_limit = ascc_plan_neighbor_limit(plan),
@@ -261,6 +266,9 @@ ascc_status ascc_model_get_info(const ascc_model *model, ascc_model_info *info)
         .receptive_radius = ascc_plan_receptive_radius(plan),
         .name = plan->name,
         .description = plan->description,
+        .time_step_min = plan->time_step_min,
+        .time_step_max = plan->time_step_max,
+        .multiply_adds = ascc_cost(plan, &counts),
     };
     return ascc_write_struct(info, &own, sizeof own, sizeof own) ? ASCC_OK : ASCC_ERROR_ARGUMENT;
 }

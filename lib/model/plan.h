@@ -1,85 +1,227 @@
-/* Collects the layers of a network and checks each against the tensors of its file.
+/* A network as the solver runs it: an immutable plan of layers, checked once when it is loaded.
  * SPDX-License-Identifier: MIT
  *
- * A reader of a description fills `plan`'s own numbers, adds features, levels, layers, terms and the
- * output in this order, then finishes. Everything the solver relies on is checked here, once, so
- * that no file gets past it, whatever its format.
+ * The plan is a list of values. Value 0 holds the features of the fluid particles, value 1 those of
+ * the boundary particles; layer i makes value i + 2, on one point set, as a sum of terms:
+ *
+ *     value[row][column ..] += operation(source value)
+ *
+ * so "concat" is terms with different columns, "sum" terms with the same. The output is the last term:
+ * what it makes of its source are impulses. Which operations there are stands in network/operations.list.
  */
 #ifndef ASCC_PLAN_H
 #define ASCC_PLAN_H
 
-#include "model.h"
-#include "file/safetensors.h"
+#include <math.h>
 
+#include "base/context.h"
+
+#define ASCC_MAX_LEVELS 8
+#define ASCC_MAX_CHANNELS 1024
 #define ASCC_MAX_LAYERS 256
 #define ASCC_MAX_TERMS 2048
+#define ASCC_MAX_CELLS 4096 /* of one kernel */
+#define ASCC_MAX_BUMPS 8    /* of a radial basis */
+#define ASCC_MAX_ORDER 2
+#define ASCC_MAX_FEATURES 8
 #define ASCC_PLAN_MIN 1e-15 /* smallest and largest length, time or density a file may state */
 #define ASCC_PLAN_MAX 1e15
 
-typedef struct ascc_plan_term {
+/* Point sets. Level 0 is fluid + boundary; set ASCC_SET_LEVEL + l - 1 is level l >= 1. */
+enum { ASCC_SET_FLUID = 0, ASCC_SET_BOUNDARY = 1, ASCC_SET_ALL = 2, ASCC_SET_LEVEL = 3 };
+#define ASCC_MAX_SETS (ASCC_SET_LEVEL + ASCC_MAX_LEVELS - 1)
+
+typedef enum ascc_window {
+    ASCC_WINDOW_NONE,
+    ASCC_WINDOW_POLY6,
+    ASCC_WINDOW_PEAK,
+    ASCC_WINDOW_HAT, /* trilinear within a cube */
+} ascc_window;
+
+typedef enum ascc_mapping {
+    ASCC_MAPPING_IDENTITY,  /* the ball's bounding cube */
+    ASCC_MAPPING_RADIAL,    /* r scaled so that the ball fills the cube */
+    ASCC_MAPPING_VOLUME,    /* volume preserving */
+    ASCC_MAPPING_DIRECTION, /* of a basis: unit vector and distance */
+} ascc_mapping;
+
+/* How an operation looks around a point. */
+typedef struct ascc_filter {
+    /* Of a grid: along x, y, z; 2D: z = 1. Of a basis: harmonics, bumps, 1. */
+    int32_t cells[3];
+    int32_t neighbor_limit; /* mutual where source and query are one set; 0 = none */
+    ascc_window window;
+    ascc_mapping mapping;
+    int32_t skip_self;    /* a point with the query's very position is no neighbour */
+    int32_t bumps, order; /* of a basis in place of a grid, else 0 */
+    int32_t reserved;
+    double radius; /* m; 0 = it does not look around */
+} ascc_filter;
+
+/* Numbers of a filter's kernel: cells of a grid, members of a basis. */
+static inline size_t ascc_cell_count(const ascc_filter *filter)
+{
+    return (size_t)filter->cells[0] * (size_t)filter->cells[1] * (size_t)filter->cells[2];
+}
+
+#define ASCC_MAX_TENSORS 4
+enum { ASCC_TENSOR_WEIGHT = 0, ASCC_TENSOR_BIAS = 1 }; /* what most operations have */
+
+struct ascc_operation;
+
+typedef struct ascc_term {
+    const struct ascc_operation *operation;
+    int32_t source;  /* value, made earlier */
+    int32_t rectify; /* ReLU on the source's values as they are read */
+    int32_t column;  /* first column of the layer it adds to */
+    int32_t inputs;  /* channels of the source */
+    int32_t outputs; /* columns it adds to; column + outputs <= layer's channels */
+    int32_t reserved;
+    const float *tensor[ASCC_MAX_TENSORS]; /* as in the file; which is which, the operation says */
+    double option[4];                      /* the operation's own */
+    ascc_filter filter;
+} ascc_term;
+
+typedef struct ascc_layer {
+    char name[32];
+    int32_t set;
+    int32_t channels;
+    int32_t first_term, term_count;
+} ascc_layer;
+
+/* The last term, and what follows it. */
+typedef struct ascc_output {
     ascc_term term;
-    int32_t weight, bias; /* tensors, -1 = none */
-} ascc_plan_term;
+    int32_t conserves; /* momentum: each impulse is a pair's */
+    int32_t central;   /* and lies on the line between the two, as the network sees them ... */
+    int32_t current_direction; /* ... or, fluid pairs, as they are before the step */
+    int32_t half_axis;         /* of a kernel of which half is stored; -1 = all of it is */
+    int32_t has_walls;         /* pairs of a fluid particle and a wall are on their own */
+    int32_t reserved;
+    ascc_filter walls;
+    double scale[3]; /* metres of position correction in one time step per unit of output */
+    double limit;    /* the greatest such correction by one pair, m; 0 = none */
+    double contact;  /* m: no particle comes closer to a wall (step/contact.h); 0 = no contact */
+} ascc_output;
 
-/* How the antisymmetric kernel is stored. */
-enum { ASCC_HALF_X = 0, ASCC_HALF_Y = 1, ASCC_HALF_Z = 2, ASCC_FULL = 3 };
+/* Tensors of an output with pairs; the latter three with a basis only. */
+enum {
+    ASCC_TENSOR_STRENGTH = 0,
+    ASCC_TENSOR_DAMPING = 1,
+    ASCC_TENSOR_WALL = 2,
+    ASCC_TENSOR_WALL_DAMPING = 3
+};
 
-typedef struct ascc_plan_builder {
-    ascc_allocator allocator;
-    const ascc_safetensors *file;
-    ascc_message *message;
-    ascc_plan plan; /* layer and term are NULL until finished */
+/* The greatest strength of a pair, in units of output. */
+static inline double ascc_output_limit(const ascc_output *output)
+{
+    const double scale = output->scale[0] < 0.0 ? -output->scale[0] : output->scale[0];
+    return output->limit > 0.0 ? output->limit / scale : HUGE_VAL;
+}
+
+typedef enum ascc_feature {
+    ASCC_FEATURE_ONE,
+    ASCC_FEATURE_VELOCITY, /* fluid: after external forces, m/s; dimension channels */
+    ASCC_FEATURE_NORMAL,   /* boundary; dimension channels */
+    ASCC_FEATURE_MOTION,   /* velocity in spacings a time step; walls 0; dimension channels */
+    ASCC_FEATURE_GRAVITY, /* fluid: the step's, in spacings a squared time step; dimension channels */
+} ascc_feature;
+
+typedef enum ascc_sampling {
+    ASCC_SAMPLING_CENTERS,  /* centres of occupied voxels (the paper) */
+    ASCC_SAMPLING_CORNERS,  /* corners of cells with hysteresis (the published networks) */
+    ASCC_SAMPLING_FARTHEST, /* farthest points (the paper's ablation) */
+} ascc_sampling;
+
+typedef struct ascc_level {
+    double voxel; /* m, level >= 1 */
+    double ratio; /* farthest: points kept of level 0, in (0, 1] */
+} ascc_level;
+
+typedef enum ascc_advection {
+    ASCC_ADVECT_NONE, /* the network sees x (the paper, figure 1) */
+    ASCC_ADVECT_END,  /* x + dt v*; v* = v + dt g */
+    ASCC_ADVECT_MEAN, /* x + dt (v + v*) / 2, and that mean is the velocity corrected (CConv) */
+} ascc_advection;
+
+typedef struct ascc_plan {
+    char name[64];
+    char description[512];
+    int32_t dimension;
+    ascc_advection advection;
+    double time_step, gravity[3], spacing, rest_density;
+    double time_step_min, time_step_max; /* s: the range that the weights were trained in */
+    int32_t fluid_features[ASCC_MAX_FEATURES], fluid_feature_count, fluid_channels;
+    int32_t boundary_features[ASCC_MAX_FEATURES], boundary_feature_count, boundary_channels;
+    double boundary_crop; /* m: walls farther than this from the fluid's bounding box are left out;
+                             <= 0: none are */
+    int32_t level_count;
+    ascc_sampling sampling;
+    int32_t
+        centroid_anchor; /* voxel grids hang on the mean of level 0 instead of the world's origin */
+    int32_t reserved;
+    double hysteresis; /* of ASCC_SAMPLING_CORNERS, in voxels */
+    ascc_level level[ASCC_MAX_LEVELS];
+    int32_t layer_count, term_count;
     ascc_layer *layer;
-    size_t layer_capacity;
-    ascc_plan_term *term;
-    size_t term_capacity;
-    int32_t output_tensor, output_storage;
-    int32_t damping_tensor, wall_tensor, wall_damping_tensor; /* -1 = none */
-    size_t *offset; /* of each tensor in the weights; SIZE_MAX = not used */
-} ascc_plan_builder;
+    ascc_term *term;
+    ascc_output output;
+    uint64_t parameter_count;
+} ascc_plan;
 
-ascc_status ascc_plan_open(const ascc_allocator *allocator, const ascc_safetensors *file,
-                           ascc_plan_builder *builder, ascc_message *message);
-void ascc_plan_close(ascc_plan_builder *builder);
+/* A term by number; number term_count is the output. */
+static inline const ascc_term *ascc_plan_term(const ascc_plan *plan, int32_t t)
+{
+    return t < plan->term_count ? &plan->term[t] : &plan->output.term;
+}
 
-/* Copies a file's text into an array of the plan. */
-ascc_status ascc_plan_text(ascc_plan_builder *builder, const char *what, const char *text,
-                           char *into, size_t capacity);
+static inline int32_t ascc_plan_term_number(const ascc_plan *plan, const ascc_term *term)
+{
+    return term == &plan->output.term ? plan->term_count : (int32_t)(term - plan->term);
+}
 
-/* Counts channels of the features and checks dimension and the plan's own numbers. */
-ascc_status ascc_plan_begin(ascc_plan_builder *builder);
-ascc_status ascc_plan_add_layer(ascc_plan_builder *builder, const char *name, int32_t set,
-                                int32_t channels);
-/* A term of the layer added last. `inputs`, `outputs` and `filter.cells` are found here; NULL names
- * = no tensor. */
-ascc_status ascc_plan_add_term(ascc_plan_builder *builder, const ascc_term *term,
-                               const char *weight, const char *bias);
-/* Tensors of an output; NULL = none. */
-typedef struct ascc_output_names {
-    const char *weight, *damping, *wall_weight, *wall_damping;
-} ascc_output_names;
-/* `inputs`, `filter.cells` are found here; no weight for a plain output. */
-ascc_status ascc_plan_set_output(ascc_plan_builder *builder, const ascc_output *output,
-                                 const ascc_output_names *names, int32_t storage);
+/* Set and channels of a value; layer: the plan's, or those of one that is being made. */
+static inline int32_t ascc_plan_value_set(const ascc_layer *layer, int32_t value)
+{
+    return value < 2 ? value : layer[value - 2].set;
+}
 
-/* Value of that name ("fluid", "boundary" or a layer's), -1 = none; its set and channels. */
-int32_t ascc_plan_find_value(const ascc_plan_builder *builder, const char *name);
-int32_t ascc_plan_value_set(const ascc_layer *layer, int32_t value);
-int32_t ascc_plan_value_channels(const ascc_plan *plan, const ascc_layer *layer, int32_t value);
+static inline int32_t ascc_plan_value_channels(const ascc_plan *plan, const ascc_layer *layer,
+                                               int32_t value)
+{
+    return value == 0   ? plan->fluid_channels
+           : value == 1 ? plan->boundary_channels
+                        : layer[value - 2].channels;
+}
 
-/* Arranges the weights and hands out plan and weights, both to be released with
- * ascc_plan_release. */
-ascc_status ascc_plan_finish(ascc_plan_builder *builder, ascc_plan *plan, float **weights,
-                             size_t *weight_count);
-/* Makes the whole kernel of an output of which half is stored. */
-void ascc_plan_expand(const ascc_plan *plan, float *whole);
+/* Channels as they are stored: a multiple of 8, the rest zeros. */
+static inline size_t ascc_padded(int32_t channels)
+{
+    return ((size_t)channels + 7) / 8 * 8;
+}
 
-void ascc_plan_release(const ascc_allocator *allocator, ascc_plan *plan, float *weights,
-                       size_t weight_count);
+/* First channel of the feature motion of value 0 (fluid) or 1 (boundary), -1 = none. */
+static inline int32_t ascc_plan_motion(const ascc_plan *plan, int32_t value)
+{
+    const int32_t *feature = value == 0 ? plan->fluid_features : plan->boundary_features;
+    const int32_t count = value == 0 ? plan->fluid_feature_count : plan->boundary_feature_count;
+    int32_t channel = 0;
+    for (int32_t i = 0; i < count; i++) {
+        if (feature[i] == ASCC_FEATURE_MOTION)
+            return channel;
+        channel += feature[i] == ASCC_FEATURE_ONE ? 1 : plan->dimension;
+    }
+    return -1;
+}
 
-/* Lengths that follow from a plan, m: of the last layer, and how far influence reaches in a step. */
+/* ---- Lengths that follow (plan_lengths.c) ---- */
+
+/* m: of the last layer, and how far influence reaches in a step. */
 double ascc_plan_support_radius(const ascc_plan *plan);
 double ascc_plan_receptive_radius(const ascc_plan *plan);
+/* Smallest and largest radius of any neighbour list, m. */
+void ascc_plan_radii(const ascc_plan *plan, double *smallest, double *largest);
+/* Most neighbours that any list keeps; 0 = all. */
 int32_t ascc_plan_neighbor_limit(const ascc_plan *plan);
 
 #endif

@@ -7,24 +7,6 @@
 
 #include "points/resample.h"
 
-void ascc_plan_radii(const ascc_plan *plan, double *smallest, double *largest)
-{
-    *smallest = INFINITY;
-    *largest = 0.0;
-    for (int32_t t = 0; t <= plan->term_count; t++) {
-        const bool last = t == plan->term_count;
-        if (last ? plan->output.kind != ASCC_OUTPUT_ANTISYMMETRIC
-                 : !ascc_term_searches(&plan->term[t]))
-            continue;
-        const double radius = last ? plan->output.filter.radius : plan->term[t].filter.radius;
-        *smallest = radius < *smallest ? radius : *smallest;
-        *largest = radius > *largest ? radius : *largest;
-    }
-    *largest = fmax(*largest, plan->output.walls.filter.radius);
-    if (*largest == 0.0) /* a network of dense layers: any scale will do */
-        *smallest = *largest = plan->spacing > 0.0 ? plan->spacing : 1.0;
-}
-
 /* Which boundary particles the network sees: those within the crop of the fluid's bounding box. */
 static size_t keep_boundary(uint32_t *kept, const ascc_plan *plan, const ascc_scene *scene)
 {

@@ -3,7 +3,7 @@
 #ifndef ASCC_HIERARCHY_H
 #define ASCC_HIERARCHY_H
 
-#include "model/model.h"
+#include "model/plan.h"
 #include "points/neighbors.h"
 
 #define ASCC_MAX_GRIDS 64
@@ -39,9 +39,6 @@ ascc_status ascc_hierarchy_build(ascc_hierarchy *hierarchy, const ascc_search_to
 /* The grid of a set for a search radius in units, made when first asked for. errors: MEMORY, RANGE. */
 ascc_status ascc_hierarchy_grid(ascc_hierarchy *hierarchy, const ascc_search_tools *tools, int set,
                                 double radius, const ascc_grid **grid);
-
-/* Largest and smallest radius of any layer, metres. */
-void ascc_plan_radii(const ascc_plan *plan, double *smallest, double *largest);
 
 /* Host's fluid row of a row of fluid, boundary or all, or fluid_count + boundary row. */
 static inline size_t ascc_hierarchy_host_row(const ascc_hierarchy *hierarchy, int32_t set,

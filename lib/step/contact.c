@@ -1,5 +1,16 @@
-/* Walls that nothing passes, as contact.h draws it. SPDX-License-Identifier: MIT */
-#include "contact.h"
+/* Walls that nothing passes: motion through a wall ends at a distance from it, momentum goes to the wall.
+ * SPDX-License-Identifier: MIT
+ *
+ * Each wall particle w with normal n stands for a disc. What moves from x0 to x1 meets it where it comes
+ * closer to the disc's plane than the contact distance c, no farther from the axis than its radius:
+ *
+ *         x0 .                    the rest of the way goes on along the wall,
+ *             \      n            from p to x1 + (c - (x1 - w).n) n,
+ *      c ......p..+..^......      where it may meet the next one
+ *               \    |
+ *      ----------\---w------
+ */
+#include "stage.h"
 
 #include <inttypes.h>
 #include <math.h>
@@ -12,8 +23,6 @@
 #define SLACK 0.25
 /* Depths below this, in spacings, are rounding. */
 #define NOTHING 1e-9
-/* Where a wall's sum of impulses is called full: one more particle cannot overflow it. */
-#define WALL_LIMIT ((int64_t)1 << 62)
 
 typedef struct contact_job {
     const ascc_network_run *run;
@@ -93,7 +102,7 @@ static bool end_at(contact_job *job, size_t row, size_t wall, const double *to)
             return false;
         const int64_t before = __atomic_fetch_add(
             &job->wall[wall * d + c], job->advance->momentum[k] - momentum, __ATOMIC_RELAXED);
-        if (before >= WALL_LIMIT || before <= -WALL_LIMIT)
+        if (before >= ASCC_WALL_LIMIT || before <= -ASCC_WALL_LIMIT)
             return false;
         job->advance->momentum[k] = momentum;
         job->advance->position[k] =
@@ -138,27 +147,29 @@ static void hold_rows(void *data, size_t begin, size_t end, int32_t slot)
         }
 }
 
-ascc_status ascc_contact(const ascc_network_run *run, const ascc_particles *p, double time_step,
-                         double unit, ascc_advance *advance, const ascc_impulses *impulses)
+ascc_status ascc_stage_contact(ascc_step_state *state)
 {
-    const ascc_plan *plan = run->network->plan;
-    const double spacing = plan->spacing / unit;
-    contact_job job = {.run = run,
-                       .rows = &run->rows[run->network->wall_key],
+    const ascc_plan *plan = state->network->plan;
+    const ascc_particles *p = state->particles;
+    if (!(plan->output.contact > 0.0) || p->fluid_count == 0)
+        return ASCC_OK;
+    const double spacing = plan->spacing / state->length_unit;
+    contact_job job = {.run = &state->run,
+                       .rows = ascc_term_list(&state->run, &plan->output.term, 1),
                        .p = p,
-                       .time_step = time_step,
-                       .distance = plan->output.walls.contact / unit,
+                       .time_step = state->motion->time_step,
+                       .distance = plan->output.contact / state->length_unit,
                        .disc_square = DISC * DISC * spacing * spacing,
                        .slack = SLACK * spacing,
                        .nothing = NOTHING * spacing,
-                       .advance = advance,
-                       .wall = impulses->wall};
-    ascc_workers_run(run->tools->workers, run->hierarchy->set[ASCC_SET_FLUID].count, 256, hold_rows,
-                     &job);
+                       .advance = &state->advance,
+                       .wall = state->impulses.wall};
+    ascc_workers_run(state->tools.workers, state->hierarchy.set[ASCC_SET_FLUID].count, 256,
+                     hold_rows, &job);
     const size_t bad = atomic_load(&job.bad);
     if (bad)
-        return ascc_fail(run->tools->message, ASCC_ERROR_RANGE,
+        return ascc_fail(state->tools.message, ASCC_ERROR_RANGE,
                          "fluid row %zu: a wall gives it a momentum too large to hold",
-                         ascc_hierarchy_host_row(run->hierarchy, ASCC_SET_FLUID, bad - 1));
+                         ascc_hierarchy_host_row(&state->hierarchy, ASCC_SET_FLUID, bad - 1));
     return ASCC_OK;
 }

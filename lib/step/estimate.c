@@ -45,7 +45,7 @@ static double set_density(const ascc_plan *plan, int32_t set)
 }
 
 /* Neighbours of a row inside the fluid, itself included. */
-static double row_length(const ascc_plan *plan, const ascc_rows_key *key)
+static double row_length(const ascc_plan *plan, const ascc_list_key *key)
 {
     const double ball = plan->dimension == 2 ? 3.1416 * key->radius * key->radius
                                              : 4.1888 * key->radius * key->radius * key->radius;
@@ -54,7 +54,7 @@ static double row_length(const ascc_plan *plan, const ascc_rows_key *key)
     return key->limit ? fmin(all, key->limit + 1.0) : all;
 }
 
-static double rows_bytes(const ascc_plan *plan, const ascc_rows_key *key, double queries)
+static double rows_bytes(const ascc_plan *plan, const ascc_list_key *key, double queries)
 {
     return queries * (12.0 + 4.0 * 1.125 * row_length(plan, key));
 }
@@ -75,12 +75,12 @@ static double search_bytes(const ascc_network *network, double fluid, double bou
     const ascc_plan *plan = network->plan;
     double bytes = 0.0;
     for (int32_t k = 0; k < network->key_count; k++) {
-        const ascc_rows_key *key = &network->key[k];
+        const ascc_list_key *key = &network->key[k];
         const double queries = set_points(plan, key->query, fluid, boundary);
         bytes += rows_bytes(plan, key, queries);
         bool query_done = false, source_done = false; /* grids are shared */
         for (int32_t j = 0; j < k; j++) {
-            const ascc_rows_key *old = &network->key[j];
+            const ascc_list_key *old = &network->key[j];
             const bool same = old->radius == key->radius;
             query_done |= same && (old->query == key->query || old->source == key->query);
             source_done |= same && (old->query == key->source || old->source == key->source);
@@ -105,21 +105,27 @@ static double value_bytes(const ascc_network *network, double fluid, double boun
     return bytes;
 }
 
-/* Lent to a worker for the widest layer: columns of a tile, a row's geometry; roughly. */
+/* Lent to a worker for the widest layer: columns of a tile, scratch of its terms; roughly. */
 static double layer_bytes(const ascc_plan *plan, double longest)
 {
     double most = 0.0;
     for (int32_t t = 0; t < plan->term_count; t++) {
-        const ascc_filter *filter = &plan->term[t].filter;
-        const double cells = (double)filter->cells[0] * filter->cells[1] * filter->cells[2];
-        const double relative =
-            plan->term[t].relative ? (double)ascc_padded(plan->term[t].inputs) : 0.0;
-        const double members = (filter->bumps ? cells : 0.0) + relative;
-        if (ascc_term_searches(&plan->term[t]))
-            most = fmax(most, 24.0 * (cells * (double)ascc_padded(plan->term[t].inputs) + 80.0) +
-                                  (4.0 + members) * longest);
+        const ascc_term *term = &plan->term[t];
+        ascc_scratch_sizes sizes = {.room = (size_t)longest};
+        if (term->operation->scratch)
+            term->operation->scratch(plan, term, &sizes);
+        most = fmax(most, ASCC_TILE_ROWS * ((double)sizes.column + 80.0) + (double)sizes.scratch);
     }
     return 4.0 * most;
+}
+
+/* Lent for each row of the output's set. */
+static double output_bytes(const ascc_plan *plan)
+{
+    ascc_scratch_sizes sizes = {0};
+    if (plan->output.term.operation->scratch)
+        plan->output.term.operation->scratch(plan, &plan->output.term, &sizes);
+    return 9.0 + (double)sizes.column;
 }
 
 /* Lent while the points are sorted and sampled. */
@@ -151,11 +157,7 @@ size_t ascc_estimate_scratch(const ascc_network *network, size_t fluid, size_t b
     const double search = search_bytes(network, f, b);
     const double forward =
         features + all * 4.0 + (double)threads * layer_bytes(plan, 1.5 * longest);
-    const bool direct = !plan->output.filter.bumps && !plan->output.radial; /* sums of four */
-    double shares = plan->output.current_direction ? 24.0 : 0.0;            /* and places */
-    for (int part = 0; part < ASCC_PARTS && plan->output.filter.bumps; part++)
-        shares += network->part_weight[part] ? 32.0 : 0.0;
-    const double last = all * (direct ? 41.0 : 9.0 + shares + 8.0 * d);
+    const double last = all * output_bytes(plan);
     double bytes = fmax(features + hierarchy_bytes(plan, f, b),
                         search + value_bytes(network, f, b) + fmax(forward, last));
     bytes = 1.125 * (points + bytes) + 64e3; /* what a block has more; small things */

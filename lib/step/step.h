@@ -1,36 +1,32 @@
-/* One step as the library itself runs it, and what it leaves to be looked at.
- * SPDX-License-Identifier: MIT */
+/* The step handle, and one step as the trainer runs it. SPDX-License-Identifier: MIT */
 #ifndef ASCC_STEP_H
 #define ASCC_STEP_H
 
-#include "network/antisymmetric.h"
-#include "integrate.h"
+#include "engine.h"
+#include "model/model.h"
 
 struct ascc_step {
     uint32_t magic;
+    int32_t substeps;      /* of a host's time step */
     ascc_context *context; /* retained */
     ascc_model *model;     /* retained */
-    double time_step, length_unit, max_displacement;
+    double time_step;      /* of a substep, s */
+    double length_unit, max_displacement;
     ascc_network network;
+    size_t *expected; /* [key_count of the network] neighbours of the last step */
+    ascc_engine engine;
     ascc_arena arena;
     double *acceleration; /* the host's, [fluid][dimension] */
     size_t acceleration_capacity;
+    unsigned char *kept; /* the state before the first of several substeps */
+    size_t kept_capacity;
     ascc_step_statistics statistics;
     ascc_message message;
 };
 
-/* All intermediate results of one step, in its arena: valid until that is reset. */
-typedef struct ascc_step_trace {
-    ascc_search_tools tools;
-    ascc_hierarchy hierarchy;
-    ascc_network_run run;
-    ascc_advance advance;
-    ascc_impulses impulses;
-} ascc_step_trace;
-
 /* One step of a particle set that suits the model, with an arena that is reset first. On failure the
- * particles stay as they were. */
+ * particles stay as they were. first: of a run, whose sums begin with it. */
 ascc_status ascc_step_once(ascc_step *step, ascc_particles *p, const ascc_motion *motion,
-                           ascc_arena *arena, ascc_step_trace *trace);
+                           bool first, ascc_arena *arena, ascc_step_state *state);
 
 #endif

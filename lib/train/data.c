@@ -6,7 +6,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "model/plan.h"
 #include "near.h"
 
 #define BINS 4096 /* of the histograms that percentiles come from */

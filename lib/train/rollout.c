@@ -18,10 +18,10 @@ bool ascc_rollout_worker_open(ascc_rollout_worker *w, ascc_context *context,
     ascc_arena_open(&w->scratch, &context->allocator);
     ascc_arena_open(&w->loss_scratch, &context->allocator);
     w->kept = ascc_allocate(&context->allocator, w->kept_count, sizeof *w->kept);
-    w->trace = ascc_allocate(&context->allocator, w->kept_count, sizeof *w->trace);
+    w->state = ascc_allocate(&context->allocator, w->kept_count, sizeof *w->state);
     for (size_t i = 0; w->kept && i < w->kept_count; i++)
         ascc_arena_open(&w->kept[i], &context->allocator);
-    if (w->kept && w->trace && ascc_step_create(context, model, NULL, &w->step) == ASCC_OK)
+    if (w->kept && w->state && ascc_step_create(context, model, NULL, &w->step) == ASCC_OK)
         return true;
     ascc_rollout_worker_close(w);
     return false;
@@ -37,8 +37,8 @@ void ascc_rollout_worker_close(ascc_rollout_worker *w)
         ascc_arena_close(&w->kept[i]);
     if (w->kept)
         ascc_release(allocator, w->kept, w->kept_count, sizeof *w->kept);
-    if (w->trace)
-        ascc_release(allocator, w->trace, w->kept_count, sizeof *w->trace);
+    if (w->state)
+        ascc_release(allocator, w->state, w->kept_count, sizeof *w->state);
     if (w->memory)
         ascc_release(allocator, w->memory, w->memory_count, sizeof *w->memory);
     ascc_arena_close(&w->scratch);
@@ -139,8 +139,8 @@ static ascc_status open_particles(rollout *r)
 /* A step into this arena. */
 static ascc_status step_into(rollout *r, size_t arena)
 {
-    return ascc_step_once(r->worker->step, r->particles, &r->motion, &r->worker->kept[arena],
-                          &r->worker->trace[arena]);
+    return ascc_step_once(r->worker->step, r->particles, &r->motion, true, &r->worker->kept[arena],
+                          &r->worker->state[arena]);
 }
 
 static bool blown_up(const rollout *r, size_t frame)
@@ -207,8 +207,7 @@ static ascc_status loss_at(rollout *r, size_t t, size_t horizon, double *loss, d
 }
 
 /* Gradients after a step become those before it. */
-static ascc_status step_back(rollout *r, size_t t, const ascc_step_trace *trace, float *arranged,
-                             float *gradient)
+static ascc_status step_back(rollout *r, size_t t, const ascc_step_state *state, float *packed)
 {
     ascc_rollout_worker *w = r->worker;
     const size_t n = r->numbers;
@@ -220,14 +219,13 @@ static ascc_status step_back(rollout *r, size_t t, const ascc_step_trace *trace,
     const bool first = t == 0;
     const bool places = r->task->position_gradients && !first;
     memset(r->seen, 0, 3 * n * sizeof *r->seen); /* seen, place, velocity lie together */
-    const ascc_backward pass = {.step = w->step,
-                                .trace = trace,
+    const ascc_backward pass = {.run = &state->run,
                                 .transposed = r->transposed,
                                 .arena = &w->scratch,
+                                .time_step = w->step->time_step,
                                 .position = r->state + t * n,
                                 .correction = r->by_velocity,
-                                .arranged = arranged,
-                                .bias = gradient,
+                                .packed = packed,
                                 .velocity = first ? NULL : r->velocity,
                                 .seen = places ? r->seen : NULL,
                                 .place = places ? r->place : NULL};
@@ -261,13 +259,13 @@ static size_t go_forwards(rollout *r, ascc_rollout_result *result, size_t *kept_
     return horizon;
 }
 
-static void go_back(rollout *r, ascc_rollout_result *result, size_t kept_from, float *arranged,
+static void go_back(rollout *r, ascc_rollout_result *result, size_t kept_from, float *packed,
                     float *gradient)
 {
     const size_t horizon = (size_t)r->task->horizon, n = r->numbers;
-    const ascc_network *network = &r->worker->step->network;
+    const ascc_model *model = r->worker->model;
     double unused = 0.0;
-    memset(arranged, 0, network->weight_count * sizeof *arranged);
+    memset(packed, 0, model->packed.count * sizeof *packed);
     memset(r->by_position, 0, n * sizeof *r->by_position);
     memset(r->by_velocity, 0, n * sizeof *r->by_velocity);
     for (size_t t = horizon; t > 0 && result->status == ASCC_OK; t--) {
@@ -282,15 +280,14 @@ static void go_back(rollout *r, ascc_rollout_result *result, size_t kept_from, f
             result->status = step_into(r, 0);
         }
         if (result->status == ASCC_OK)
-            result->status = step_back(r, t - 1, &r->worker->trace[arena], arranged, gradient);
+            result->status = step_back(r, t - 1, &r->worker->state[arena], packed);
     }
     if (result->status == ASCC_OK)
-        ascc_backward_fold(network, r->worker->model, arranged, gradient);
+        ascc_packed_fold(&model->packed, &model->plan, model->weights, packed, gradient);
 }
 
 ascc_rollout_result ascc_rollout_run(ascc_rollout_worker *worker, const ascc_transposed *transposed,
-                                     const ascc_rollout_task *task, float *arranged,
-                                     float *gradient)
+                                     const ascc_rollout_task *task, float *packed, float *gradient)
 {
     ascc_rollout_result result = {.status = ASCC_OK};
     const ascc_plan *plan = &worker->model->plan;
@@ -312,7 +309,7 @@ ascc_rollout_result ascc_rollout_run(ascc_rollout_worker *worker, const ascc_tra
             result.status = loss_at(&r, t, horizon, &result.loss, NULL);
         result.skipped = done < horizon;
         if (!result.skipped && result.status == ASCC_OK && task->backward && isfinite(result.loss))
-            go_back(&r, &result, kept_from, arranged, gradient);
+            go_back(&r, &result, kept_from, packed, gradient);
         if (result.status == ASCC_ERROR_RANGE) { /* a loss of particles beyond all bounds */
             result.skipped = true;
             result.status = ASCC_OK;

@@ -3,7 +3,8 @@
 #ifndef ASCC_TRAIN_ROLLOUT_H
 #define ASCC_TRAIN_ROLLOUT_H
 
-#include "backward.h"
+#include "network/reverse.h"
+#include "step/step.h"
 #include "data.h"
 
 /* What a rollout asks for. */
@@ -37,7 +38,7 @@ typedef struct ascc_rollout_worker {
     ascc_step *step;
     ascc_arena scratch, loss_scratch; /* of reverse passes, of losses */
     ascc_arena *kept;       /* [kept_count] arenas of steps, by number modulo their count */
-    ascc_step_trace *trace; /* [kept_count] */
+    ascc_step_state *state; /* [kept_count] */
     size_t kept_count;
     double *memory; /* states and gradients */
     size_t memory_count;
@@ -47,11 +48,10 @@ bool ascc_rollout_worker_open(ascc_rollout_worker *worker, ascc_context *context
                               const ascc_model *model, int32_t longest_horizon);
 void ascc_rollout_worker_close(ascc_rollout_worker *worker);
 
-/* gradient: [weight count of the model], laid out as its weights, is added to; arranged:
- * [weight_count of the network] scratch. */
+/* gradient: [weight count of the model], laid out as its weights, is added to; packed: scratch, as large as
+ * the model's packed weights. */
 ascc_rollout_result ascc_rollout_run(ascc_rollout_worker *worker, const ascc_transposed *transposed,
-                                     const ascc_rollout_task *task, float *arranged,
-                                     float *gradient);
+                                     const ascc_rollout_task *task, float *packed, float *gradient);
 
 /* Loss of one state against the truth and its gradient (NULL = not wanted), [fluid][dimension], times
  * `share`. errors: MEMORY, RANGE. */

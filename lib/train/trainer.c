@@ -72,7 +72,19 @@ static void give(ascc_trainer *t, void *memory, size_t count, size_t element)
         ascc_release(&t->allocator, memory, count, element);
 }
 
-/* The tensors' places: the model arranges them in the order of the file, each filled up to 16. */
+/* A tensor that may hold no negative numbers, by its first weight. */
+static bool damps(const ascc_plan *plan, const float *weights)
+{
+    for (int32_t n = 0; n <= plan->term_count; n++) {
+        const ascc_term *term = ascc_plan_term(plan, n);
+        for (int i = 0; i < ASCC_MAX_TENSORS; i++)
+            if (term->tensor[i] == weights && term->operation->not_negative >> i & 1)
+                return true;
+    }
+    return false;
+}
+
+/* The tensors' places: the model arranges them in the order of the file (ascc_plan_align). */
 static ascc_status find_tensors(ascc_trainer *t)
 {
     const ascc_plan *plan = &t->model->plan;
@@ -90,10 +102,9 @@ static ascc_status find_tensors(ascc_trainer *t)
         t->tensor[i] = (ascc_trained_tensor){.first = t->parameter_count,
                                              .count = tensor->count,
                                              .offset = offset,
-                                             .damps = weights == plan->output.damping ||
-                                                      weights == plan->output.walls.damping};
+                                             .damps = damps(plan, weights)};
         t->parameter_count += tensor->count;
-        offset += (tensor->count + 15) & ~(size_t)15;
+        offset += ascc_plan_align(tensor->count);
     }
     return ASCC_OK;
 }
@@ -113,10 +124,11 @@ static ascc_status take_arrays(ascc_trainer *t)
     for (size_t i = 0; t->worker && i < threads; i++)
         if (!ascc_rollout_worker_open(&t->worker[i], t->context, t->model, longest))
             return ASCC_ERROR_MEMORY;
-    if (!t->worker || !ascc_transposed_create(&t->transposed, &t->worker[0].step->network))
+    if (!t->worker ||
+        !ascc_transposed_create(&t->transposed, &t->allocator, &t->model->plan, &t->model->packed))
         return ASCC_ERROR_MEMORY;
-    const size_t arranged = t->worker[0].step->network.weight_count;
-    t->arranged = take(t, threads * arranged, sizeof *t->arranged);
+    const size_t packed = t->model->packed.count;
+    t->packed = take(t, threads * packed, sizeof *t->packed);
     t->gradients = take(t, batch * t->model->weight_count, sizeof *t->gradients);
     t->gradient = take(t, t->parameter_count, sizeof *t->gradient);
     t->task = take(t, batch, sizeof *t->task);
@@ -124,7 +136,7 @@ static ascc_status take_arrays(ascc_trainer *t)
     t->drawn = take(t, batch, sizeof *t->drawn);
     t->weights = take(t, 4 * t->parameter_count, sizeof *t->weights);
     t->before = take(t, 4 * t->parameter_count, sizeof *t->before);
-    if (!t->arranged || !t->gradients || !t->gradient || !t->task || !t->result || !t->drawn ||
+    if (!t->packed || !t->gradients || !t->gradient || !t->task || !t->result || !t->drawn ||
         !t->weights || !t->before)
         return ASCC_ERROR_MEMORY;
     t->average = t->weights + t->parameter_count;
@@ -212,10 +224,8 @@ void ascc_trainer_destroy(ascc_trainer **trainer)
     ascc_trainer *t = *trainer;
     *trainer = NULL;
     const size_t batch = (size_t)t->batch, threads = (size_t)t->thread_count;
-    const size_t arranged =
-        t->worker && t->worker[0].step ? t->worker[0].step->network.weight_count : 0;
-    if (t->transposed.block)
-        ascc_transposed_destroy(&t->transposed, &t->worker[0].step->network);
+    const size_t packed = t->model ? t->model->packed.count : 0;
+    ascc_transposed_destroy(&t->transposed, &t->allocator);
     for (size_t i = 0; t->worker && i < threads; i++)
         ascc_rollout_worker_close(&t->worker[i]);
     for (size_t i = 0; i < t->sequence_count; i++)
@@ -223,7 +233,7 @@ void ascc_trainer_destroy(ascc_trainer **trainer)
     give(t, t->worker, threads, sizeof *t->worker);
     give(t, t->stage, (size_t)t->stage_count, sizeof *t->stage);
     give(t, t->sequence, t->sequence_capacity, sizeof *t->sequence);
-    give(t, t->arranged, threads * arranged, sizeof *t->arranged);
+    give(t, t->packed, threads * packed, sizeof *t->packed);
     give(t, t->gradients, t->model ? batch * t->model->weight_count : 0, sizeof *t->gradients);
     give(t, t->gradient, t->parameter_count, sizeof *t->gradient);
     give(t, t->task, batch, sizeof *t->task);
@@ -272,25 +282,13 @@ ascc_status ascc_trainer_get_parameters(const ascc_trainer *t, float *values)
     return ASCC_OK;
 }
 
-/* Stored whole, an antisymmetric kernel stays what it is. */
-static bool is_whole_output(const ascc_trainer *t, const ascc_trained_tensor *tensor)
-{
-    const ascc_output *output = &t->model->plan.output;
-    return output->kind == ASCC_OUTPUT_ANTISYMMETRIC && !output->half && !output->filter.bumps &&
-           output->weight == t->model->weights + tensor->offset;
-}
-
 void ascc_trainer_apply(ascc_trainer *t)
 {
     for (size_t i = 0; i < t->tensor_count; i++)
         memcpy(t->model->weights + t->tensor[i].offset, t->weights + t->tensor[i].first,
                t->tensor[i].count * sizeof *t->weights);
-    if (t->model->plan.output.half)
-        ascc_plan_expand(&t->model->plan,
-                         t->model->weights + (t->model->plan.output.weight - t->model->weights));
-    for (int32_t i = 0; i < t->thread_count; i++)
-        ascc_network_arrange(&t->worker[i].step->network);
-    ascc_transposed_update(&t->transposed, &t->worker[0].step->network);
+    ascc_packed_update(&t->model->packed, &t->model->plan);
+    ascc_transposed_update(&t->transposed, &t->model->plan, &t->model->packed);
 }
 
 ascc_status ascc_trainer_set_parameters(ascc_trainer *t, const float *values)
@@ -315,40 +313,11 @@ ascc_status ascc_trainer_set_parameters(ascc_trainer *t, const float *values)
 /* Gradient by parameter from one laid out as the model's weights, times a share. */
 static void add_gradient(ascc_trainer *t, const float *laid_out, float share, float *to)
 {
-    const ascc_output *output = &t->model->plan.output;
-    const float *base = t->model->weights;
     for (size_t i = 0; i < t->tensor_count; i++) {
         const ascc_trained_tensor *tensor = &t->tensor[i];
         const float *from = laid_out + tensor->offset;
         for (size_t k = 0; k < tensor->count; k++)
             to[tensor->first + k] += share * from[k];
-        if (is_whole_output(t, tensor)) {
-            const size_t values = (size_t)output->inputs * (size_t)t->model->plan.dimension;
-            const size_t cells = tensor->count / values;
-            for (size_t k = 0; k < tensor->count; k++) {
-                const size_t mirror = (cells - 1 - k / values) * values + k % values;
-                to[tensor->first + k] += share * 0.5f * (-from[k] - from[mirror]);
-            }
-        }
-        if (!output->half || output->half != base + tensor->offset)
-            continue;
-        /* half [z][y][x] of the whole: what the upper half does, less what its mirror does */
-        const float *whole = laid_out + (output->weight - base);
-        const int32_t *full = output->filter.cells;
-        int32_t part[3] = {full[0], full[1], full[2]};
-        part[output->half_axis] /= 2;
-        const size_t values = (size_t)output->inputs * (size_t)t->model->plan.dimension;
-        float *half = to + tensor->first;
-        for (int32_t z = 0; z < part[2]; z++)
-            for (int32_t y = 0; y < part[1]; y++)
-                for (int32_t x = 0; x < part[0]; x++, half += values) {
-                    int32_t at[3] = {x, y, z};
-                    at[output->half_axis] += part[output->half_axis];
-                    const size_t cell = (size_t)((at[2] * full[1] + at[1]) * full[0] + at[0]);
-                    const size_t mirror = (size_t)(full[0] * full[1] * full[2]) - 1 - cell;
-                    for (size_t k = 0; k < values; k++)
-                        half[k] += share * (whole[cell * values + k] - whole[mirror * values + k]);
-                }
     }
 }
 
@@ -393,7 +362,7 @@ ascc_status ascc_trainer_gradient(ascc_trainer *t, size_t sequence, size_t frame
     task.backward = gradient != NULL;
     memset(t->gradients, 0, t->model->weight_count * sizeof *t->gradients);
     const ascc_rollout_result result =
-        ascc_rollout_run(&t->worker[0], &t->transposed, &task, t->arranged, t->gradients);
+        ascc_rollout_run(&t->worker[0], &t->transposed, &task, t->packed, t->gradients);
     if (result.status != ASCC_OK)
         return rollout_failure(t, &task, &result);
     if (result.skipped)
@@ -497,11 +466,11 @@ static void run_tasks(void *data, size_t begin, size_t end, int32_t slot)
 {
     ascc_trainer *t = data;
     const size_t weights = t->model->weight_count;
-    const size_t arranged = t->worker[0].step->network.weight_count;
+    const size_t packed = t->model->packed.count;
     for (size_t b = begin; b < end; b++)
         t->result[b] =
             ascc_rollout_run(&t->worker[slot], &t->transposed, &t->task[b],
-                             t->arranged + (size_t)slot * arranged, t->gradients + b * weights);
+                             t->packed + (size_t)slot * packed, t->gradients + b * weights);
 }
 
 /* One step of Adam on the clipped gradient; damping stays without negative numbers. */

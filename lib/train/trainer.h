@@ -4,7 +4,8 @@
 
 #include <ascc/train.h>
 
-#include "model/plan.h"
+#include "model/model.h"
+#include "model/operation.h"
 #include "rollout.h"
 
 #define ASCC_TRAINER_MAGIC 0x54435341u /* "ASCT" */
@@ -35,7 +36,7 @@ struct ascc_trainer {
 
     ascc_transposed transposed;
     ascc_rollout_worker *worker; /* [threads] */
-    float *arranged;             /* [threads][network weights] */
+    float *packed;               /* [threads][packed weights] */
     float *gradients;            /* [batch][model weights] */
     float *gradient;             /* [parameters] */
     ascc_rollout_task *task;     /* [batch] */

@@ -49,19 +49,19 @@ static void check_plan(const ascc_plan *plan)
             const size_t pairs = (size_t)term->inputs * (size_t)term->outputs;
             require(term->source >= 0 && term->source <= i + 1);
             require(term->column >= 0 && term->column + term->outputs <= layer->channels);
-            if (term->kind == ASCC_TERM_CONVOLUTION)
-                read_all(term->weight, cell_count(&term->filter) * pairs);
-            else if (term->kind != ASCC_TERM_IDENTITY)
-                read_all(term->weight, pairs);
-            if (term->bias)
-                read_all(term->bias, (size_t)term->outputs);
+            if (term->tensor[ASCC_TENSOR_WEIGHT])
+                read_all(term->tensor[ASCC_TENSOR_WEIGHT], cell_count(&term->filter) * pairs);
+            if (term->tensor[ASCC_TENSOR_BIAS])
+                read_all(term->tensor[ASCC_TENSOR_BIAS], (size_t)term->outputs);
         }
     }
     const ascc_output *output = &plan->output;
-    require(output->source >= 0 && output->source < plan->layer_count + 2);
-    if (output->kind == ASCC_OUTPUT_ANTISYMMETRIC)
-        read_all(output->weight, cell_count(&output->filter) * (size_t)output->inputs *
-                                     (size_t)(output->filter.bumps ? 1 : plan->dimension));
+    require(output->term.source >= 0 && output->term.source < plan->layer_count + 2);
+    if (output->conserves)
+        read_all(output->term.tensor[ASCC_TENSOR_WEIGHT],
+                 cell_count(&output->term.filter) * (size_t)output->term.inputs *
+                     (size_t)(output->term.filter.bumps ? 1 : plan->dimension) /
+                     (output->half_axis < 0 ? 1 : 2));
 }
 
 static void load(const void *bytes, size_t size)

@@ -2,6 +2,8 @@
 #include "oracle.h"
 
 #include "file/safetensors.h"
+#include "network/column.h"
+#include "network/operations.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -120,21 +122,25 @@ static double square_distance(const double a[3], const double b[3])
     return square;
 }
 
+static bool searches(const ascc_term *term)
+{
+    return term->operation->lists != NULL;
+}
+
 /* The library starts at the first particle in the order of its cells; nothing outside says so. */
 static size_t first_in_cells(const ascc_plan *plan, const point_set *all)
 {
     double smallest = INFINITY, largest = 0.0;
     for (int32_t t = 0; t <= plan->term_count; t++) {
         const bool last = t == plan->term_count;
-        if (last ? plan->output.kind != ASCC_OUTPUT_ANTISYMMETRIC
-                 : !ascc_term_searches(&plan->term[t]))
+        if (last ? !plan->output.conserves : !searches(&plan->term[t]))
             continue;
-        const double radius = last ? plan->output.filter.radius : plan->term[t].filter.radius;
+        const double radius = last ? plan->output.term.filter.radius : plan->term[t].filter.radius;
         smallest = fmin(smallest, radius);
         largest = fmax(largest, radius);
-        if (last && plan->output.walls.present) {
-            smallest = fmin(smallest, plan->output.walls.filter.radius);
-            largest = fmax(largest, plan->output.walls.filter.radius);
+        if (last && plan->output.has_walls) {
+            smallest = fmin(smallest, plan->output.walls.radius);
+            largest = fmax(largest, plan->output.walls.radius);
         }
     }
     int exponent;
@@ -395,7 +401,7 @@ static double source_of(const network_state *n, const ascc_term *term, size_t qu
 {
     const ascc_plan *plan = &n->o->model->plan;
     double x = read_value(n, term->source, term->rectify != 0, row, channel);
-    if (term->relative) {
+    if (term->option[ASCC_OPTION_RELATIVE] != 0.0) {
         const int32_t first =
             term->source == 0
                 ? motion_channel(plan->fluid_features, plan->fluid_feature_count, plan->dimension)
@@ -413,7 +419,7 @@ static void add_product(const network_state *n, const ascc_term *term, size_t ce
     for (int32_t b = 0; b < term->outputs; b++)
         for (int32_t a = 0; a < term->inputs; a++)
             out[b] += in[a] *
-                      weight_at(n->o, term->weight,
+                      weight_at(n->o, term->tensor[ASCC_TENSOR_WEIGHT],
                                 (cell * (size_t)term->inputs + (size_t)a) * (size_t)term->outputs +
                                     (size_t)b);
 }
@@ -469,12 +475,13 @@ static void transfer(const network_state *n, const ascc_layer *layer, const ascc
     for (size_t j = 0; j < source->count; j++) {
         double d[3];
         displacement(&source->point[j], query, d);
-        const double hat = hat_at(n->o->model->plan.dimension, d, term->voxel);
+        const double hat = hat_at(n->o->model->plan.dimension, d, term->option[ASCC_OPTION_VOXEL]);
         hats += hat;
         for (int32_t a = 0; hat > 0.0 && a < term->inputs; a++)
             in[a] += hat * read_value(n, term->source, term->rectify != 0, j, a);
     }
-    for (int32_t a = 0; term->normalize && hats > 0.0 && a < term->inputs; a++)
+    for (int32_t a = 0;
+         term->option[ASCC_OPTION_NORMALIZE] != 0.0 && hats > 0.0 && a < term->inputs; a++)
         in[a] /= hats;
     add_product(n, term, 0, in, out);
     free(in);
@@ -499,25 +506,24 @@ static void add_term(const network_state *n, const ascc_layer *layer, const ascc
                      size_t row, double *out)
 {
     size_t from = 0;
-    if (!ascc_term_searches(term) &&
-        !shared_row(n, n->value[term->source].set, layer->set, row, &from))
+    if (!searches(term) && !shared_row(n, n->value[term->source].set, layer->set, row, &from))
         return;
-    if (term->kind == ASCC_TERM_CONVOLUTION) {
+    if (term->operation == &ascc_op_grid || term->operation == &ascc_op_basis) {
         convolve(n, layer, term, row, out);
-    } else if (term->kind == ASCC_TERM_TRANSFER) {
+    } else if (term->operation == &ascc_op_transfer) {
         transfer(n, layer, term, row, out);
     } else {
         double *in = take((size_t)term->inputs, sizeof *in);
         for (int32_t a = 0; a < term->inputs; a++)
             in[a] = read_value(n, term->source, term->rectify != 0, from, a);
-        if (term->kind == ASCC_TERM_DENSE)
+        if (term->operation == &ascc_op_dense)
             add_product(n, term, 0, in, out);
-        for (int32_t a = 0; term->kind == ASCC_TERM_IDENTITY && a < term->inputs; a++)
+        for (int32_t a = 0; term->operation == &ascc_op_identity && a < term->inputs; a++)
             out[a] += in[a];
         free(in);
     }
-    for (int32_t b = 0; term->bias && b < term->outputs; b++)
-        out[b] += weight_at(n->o, term->bias, (size_t)b);
+    for (int32_t b = 0; term->tensor[ASCC_TENSOR_BIAS] && b < term->outputs; b++)
+        out[b] += weight_at(n->o, term->tensor[ASCC_TENSOR_BIAS], (size_t)b);
 }
 
 static values make_values(const network_state *n, int32_t set, int32_t channels)
@@ -579,12 +585,13 @@ static void run_layers(network_state *n, const double *velocity)
 static double odd_kernel(const oracle *o, const int at[3], size_t value, size_t per_cell)
 {
     const ascc_output *output = &o->model->plan.output;
-    const int32_t *n = output->filter.cells;
+    const int32_t *n = output->term.filter.cells;
     if (o->half_axis < 0) {
         const size_t cell = (size_t)((at[2] * n[1] + at[1]) * n[0] + at[0]);
         const size_t mirror = (size_t)(n[0] * n[1] * n[2] - 1) - cell;
-        return 0.5 * (weight_at(o, output->weight, cell * per_cell + value) -
-                      weight_at(o, output->weight, mirror * per_cell + value));
+        return 0.5 *
+               (weight_at(o, output->term.tensor[ASCC_TENSOR_STRENGTH], cell * per_cell + value) -
+                weight_at(o, output->term.tensor[ASCC_TENSOR_STRENGTH], mirror * per_cell + value));
     }
     int own[3] = {at[0], at[1], at[2]}, size[3] = {n[0], n[1], n[2]};
     size[o->half_axis] /= 2;
@@ -601,11 +608,11 @@ static void grid_pair(const network_state *n, const double *sum, const double d[
 {
     const ascc_plan *plan = &n->o->model->plan;
     const ascc_output *output = &plan->output;
-    const int32_t *cells = output->filter.cells;
-    const size_t d_count = (size_t)plan->dimension, inputs = (size_t)output->inputs;
+    const int32_t *cells = output->term.filter.cells;
+    const size_t d_count = (size_t)plan->dimension, inputs = (size_t)output->term.inputs;
     double *factor = take((size_t)cells[0] * (size_t)cells[1] * (size_t)cells[2], sizeof *factor);
     double term[3] = {0.0, 0.0, 0.0}, along = 0.0;
-    grid_factors(&output->filter, d, length / output->filter.radius, factor);
+    grid_factors(&output->term.filter, d, length / output->term.filter.radius, factor);
     for (int z = 0, cell = 0; z < cells[2]; z++)
         for (int y = 0; y < cells[1]; y++)
             for (int x = 0; x < cells[0]; x++, cell++)
@@ -619,14 +626,14 @@ static void grid_pair(const network_state *n, const double *sum, const double d[
         along += term[c] * d[c] / length;
     }
     for (size_t c = 0; c < d_count; c++)
-        correction[c] += output->radial ? along * d[c] / length : term[c];
+        correction[c] += output->central ? along * d[c] / length : term[c];
 }
 
 /* Sum over bumps and inputs of phi f tensor. */
 static double strength_of(const network_state *n, const ascc_filter *filter, const float *tensor,
                           const double *f, double length)
 {
-    const int32_t inputs = n->o->model->plan.output.inputs;
+    const int32_t inputs = n->o->model->plan.output.term.inputs;
     double strength = 0.0;
     for (int k = 0; tensor && length < filter->radius && k < filter->bumps; k++)
         for (int32_t a = 0; a < inputs; a++)
@@ -667,31 +674,33 @@ static void correct_particle(const network_state *n, size_t i, double *correctio
 {
     const ascc_plan *plan = &n->o->model->plan;
     const ascc_output *output = &plan->output;
-    const values *v = &n->value[output->source];
-    const bool rectify = output->rectify != 0;
+    const values *v = &n->value[output->term.source];
+    const bool rectify = output->term.rectify != 0;
     const point_set *set = &n->sets->set[v->set], *walls = &n->sets->set[ASCC_SET_BOUNDARY];
-    double *f = take((size_t)output->inputs, sizeof *f), d[3];
+    double *f = take((size_t)output->term.inputs, sizeof *f), d[3];
     for (size_t j = 0; j < set->count; j++) {
         const double length = displacement(&set->point[j], &set->point[i], d);
-        if (length > output->filter.radius || length == 0.0)
+        if (length > output->term.filter.radius || length == 0.0)
             continue;
-        for (int32_t a = 0; a < output->inputs; a++)
-            f[a] = read_value(n, output->source, rectify, i, a) +
-                   read_value(n, output->source, rectify, j, a);
-        if (!output->filter.bumps) {
+        for (int32_t a = 0; a < output->term.inputs; a++)
+            f[a] = read_value(n, output->term.source, rectify, i, a) +
+                   read_value(n, output->term.source, rectify, j, a);
+        if (!output->term.filter.bumps) {
             grid_pair(n, f, d, length, correction);
             continue;
         }
         const bool wall = j >= n->o->fluid_count;
-        central_pair(n, &output->filter, output->weight, output->damping, f, d, i, j,
+        central_pair(n, &output->term.filter, output->term.tensor[ASCC_TENSOR_STRENGTH],
+                     output->term.tensor[ASCC_TENSOR_DAMPING], f, d, i, j,
                      wall ? set->point[j].x : NULL, correction);
     }
-    for (int32_t a = 0; a < output->inputs; a++)
-        f[a] = read_value(n, output->source, rectify, i, a);
-    for (size_t j = 0; output->walls.present && j < walls->count; j++) {
+    for (int32_t a = 0; a < output->term.inputs; a++)
+        f[a] = read_value(n, output->term.source, rectify, i, a);
+    for (size_t j = 0; output->has_walls && j < walls->count; j++) {
         displacement(&walls->point[j], &set->point[i], d);
-        central_pair(n, &output->walls.filter, output->walls.weight, output->walls.damping, f, d, i,
-                     NOBODY, walls->point[j].x, correction);
+        central_pair(n, &output->walls, output->term.tensor[ASCC_TENSOR_WALL],
+                     output->term.tensor[ASCC_TENSOR_WALL_DAMPING], f, d, i, NOBODY,
+                     walls->point[j].x, correction);
     }
     free(f);
 }
@@ -702,11 +711,11 @@ static void run_output(const network_state *n, double *correction)
     const ascc_output *output = &plan->output;
     const size_t d = (size_t)plan->dimension;
     for (size_t i = 0; i < n->o->fluid_count; i++) {
-        for (size_t c = 0; output->kind == ASCC_OUTPUT_PLAIN && c < d; c++)
+        for (size_t c = 0; !output->conserves && c < d; c++)
             correction[i * d + c] =
                 output->scale[c] *
-                read_value(n, output->source, output->rectify != 0, i, (int32_t)c);
-        if (output->kind == ASCC_OUTPUT_ANTISYMMETRIC)
+                read_value(n, output->term.source, output->term.rectify != 0, i, (int32_t)c);
+        if (output->conserves)
             correct_particle(n, i, correction + i * d);
     }
 }
@@ -874,12 +883,12 @@ static void true_frame(const oracle *o, const oracle_sequence *sequence, size_t 
 /* Within which radius the last layer sees: ascc_model_info says the same. */
 static double support_radius(const ascc_plan *plan)
 {
-    const ascc_layer *layer = &plan->layer[plan->output.source - 2];
+    const ascc_layer *layer = &plan->layer[plan->output.term.source - 2];
     double radius = 0.0;
-    if (plan->output.kind == ASCC_OUTPUT_ANTISYMMETRIC)
-        return plan->output.filter.radius;
+    if (plan->output.conserves)
+        return plan->output.term.filter.radius;
     for (int32_t t = layer->first_term; t < layer->first_term + layer->term_count; t++)
-        if (ascc_term_searches(&plan->term[t]))
+        if (searches(&plan->term[t]))
             radius = fmax(radius, plan->term[t].filter.radius);
     return radius;
 }

@@ -1,0 +1,296 @@
+/* Which rows are needed, and which neighbours they have: backwards through the layers.
+ * SPDX-License-Identifier: MIT */
+#include <math.h>
+#include <string.h>
+
+#include "network.h"
+
+/* ---- Prepared once ---- */
+
+/* A radius whose cells serve the search of a cube: one that is searched anyway, if it is little more. */
+static double cube_reach(const ascc_plan *plan, double cube)
+{
+    double reach = INFINITY;
+    for (int32_t t = 0; t <= plan->term_count; t++) {
+        const ascc_term *term = ascc_plan_term(plan, t);
+        ascc_list_key key[ASCC_MAX_LISTS];
+        if (!term->operation->lists || !term->operation->lists(plan, term, 0, key))
+            continue;
+        if (key[0].cube == 0.0 && key[0].radius >= cube)
+            reach = fmin(reach, key[0].radius);
+    }
+    return reach <= 1.5 * cube ? reach : cube;
+}
+
+/* The number of a key; equal keys share it. */
+static int32_t find_key(ascc_network *network, const ascc_list_key *wanted)
+{
+    const double radius =
+        wanted->cube > 0.0 ? cube_reach(network->plan, wanted->cube) : wanted->radius;
+    int32_t k = 0;
+    for (; k < network->key_count; k++) {
+        const ascc_list_key *key = &network->key[k];
+        if (key->query == wanted->query && key->source == wanted->source &&
+            key->skip_self == wanted->skip_self && key->limit == wanted->limit &&
+            key->radius == radius && key->cube == wanted->cube)
+            return k;
+    }
+    network->key[k] = *wanted;
+    network->key[k].radius = radius;
+    network->key_count++;
+    return k;
+}
+
+/* Keys of one term, for rows of `set`, and which copies of values it reads. */
+static void prepare_term(ascc_network *network, int32_t t, int32_t set)
+{
+    const ascc_term *term = ascc_plan_term(network->plan, t);
+    const ascc_operation *operation = term->operation;
+    ascc_list_key key[ASCC_MAX_LISTS];
+    const int lists = operation->lists ? operation->lists(network->plan, term, set, key) : 0;
+    for (int i = 0; i < ASCC_MAX_LISTS; i++)
+        network->term_key[t][i] = i < lists ? find_key(network, &key[i]) : -1;
+    network->wants[term->source] |= term->rectify ? ASCC_WANTS_RECTIFIED : ASCC_WANTS_RAW;
+    if (operation->reads_features && operation->reads_features(term))
+        network->wants[0] |= ASCC_WANTS_RAW;
+}
+
+ascc_status ascc_network_create(ascc_network *network, const ascc_allocator *allocator,
+                                const ascc_plan *plan, const ascc_packed *packed,
+                                int32_t max_neighbors, ascc_message *message)
+{
+    const size_t terms = (size_t)plan->term_count + 1;
+    *network = (ascc_network){.allocator = allocator,
+                              .plan = plan,
+                              .packed = packed,
+                              .value_count = plan->layer_count + 2,
+                              .max_neighbors = max_neighbors};
+    network->key = ascc_allocate(allocator, terms * ASCC_MAX_LISTS, sizeof *network->key);
+    network->term_key = ascc_allocate(allocator, terms, sizeof *network->term_key);
+    network->wants = ascc_allocate(allocator, (size_t)network->value_count, 1);
+    if (!network->key || !network->term_key || !network->wants) {
+        ascc_network_destroy(network);
+        return ascc_fail(message, ASCC_ERROR_MEMORY, "no memory to prepare the network");
+    }
+    memset(network->wants, 0, (size_t)network->value_count);
+    for (int32_t l = 0; l < plan->layer_count; l++)
+        for (int32_t t = 0; t < plan->layer[l].term_count; t++)
+            prepare_term(network, plan->layer[l].first_term + t, plan->layer[l].set);
+    prepare_term(network, plan->term_count, ascc_network_set(network, plan->output.term.source));
+    return ASCC_OK;
+}
+
+void ascc_network_destroy(ascc_network *network)
+{
+    const ascc_allocator *a = network->allocator;
+    if (!a)
+        return;
+    const size_t terms = (size_t)network->plan->term_count + 1;
+    if (network->key)
+        ascc_release(a, network->key, terms * ASCC_MAX_LISTS, sizeof *network->key);
+    if (network->term_key)
+        ascc_release(a, network->term_key, terms, sizeof *network->term_key);
+    if (network->wants)
+        ascc_release(a, network->wants, (size_t)network->value_count, 1);
+    memset(network, 0, sizeof *network);
+}
+
+/* ---- Backwards: demand ---- */
+
+static ascc_status open_rows(ascc_network_run *run, const size_t *expected)
+{
+    const ascc_network *network = run->network;
+    ascc_hierarchy *h = run->hierarchy;
+    for (int32_t k = 0; k < network->key_count; k++) {
+        const ascc_list_key *key = &network->key[k];
+        ascc_rows *rows = &run->rows[k];
+        memset(rows, 0, sizeof *rows);
+        rows->query = &h->set[key->query];
+        rows->source = &h->set[key->source];
+        rows->radius = key->radius * h->scale.inverse;
+        rows->same = key->query == key->source;
+        rows->skip_self = key->skip_self;
+        rows->limit = key->limit;
+        rows->inverse_cube = key->cube > 0.0 ? (float)(h->scale.unit / key->cube) : 0.0f;
+        rows->max_neighbors = network->max_neighbors;
+        ascc_status status =
+            ascc_hierarchy_grid(h, run->tools, key->query, rows->radius, &rows->query_grid);
+        if (status == ASCC_OK)
+            status =
+                ascc_hierarchy_grid(h, run->tools, key->source, rows->radius, &rows->source_grid);
+        if (status == ASCC_OK)
+            status = ascc_rows_open(rows, run->tools, expected ? expected[k] : 0);
+        if (status != ASCC_OK)
+            return status;
+    }
+    return ASCC_OK;
+}
+
+static bool take_active(ascc_network_run *run)
+{
+    const ascc_network *network = run->network;
+    for (int32_t v = 0; v < network->value_count; v++) {
+        const size_t count = run->hierarchy->set[ascc_network_set(network, v)].count;
+        run->value[v].active = ascc_arena_take(run->tools->arena, count, 1);
+        if (!run->value[v].active)
+            return false;
+        memset(run->value[v].active, 0, count);
+    }
+    return true;
+}
+
+bool ascc_network_shared_row(const ascc_hierarchy *h, int32_t from, int32_t to, size_t row,
+                             size_t *shared)
+{
+    *shared = row;
+    if (from == to)
+        return true;
+    if (from == ASCC_SET_ALL && to < ASCC_SET_ALL) {
+        const bool fluid = h->origin[row] < h->fluid_count;
+        *shared = h->part[row];
+        return fluid == (to == ASCC_SET_FLUID);
+    }
+    if (from < ASCC_SET_ALL && to == ASCC_SET_ALL) {
+        *shared = h->whole[from][row];
+        return true;
+    }
+    return false;
+}
+
+typedef struct mark_job {
+    const ascc_rows *rows;
+    const uint8_t *active;
+    uint8_t *source;
+    atomic_size_t left; /* rows of the source not marked yet */
+} mark_job;
+
+static void mark_neighbors(void *data, size_t begin, size_t end, int32_t slot)
+{
+    (void)slot;
+    mark_job *job = data;
+    const ascc_rows *rows = job->rows;
+    size_t marked = 0; /* told once at the end: threads share that counter */
+    for (size_t i = begin; i < end; i++) {
+        if (!job->active[i])
+            continue;
+        if (!atomic_load_explicit(&job->left, memory_order_relaxed))
+            return;
+        const uint32_t *neighbor = rows->neighbor + rows->start[i];
+        for (uint32_t k = 0; k < rows->count[i]; k++) {
+            uint8_t *flag = &job->source[neighbor[k]];
+            if (!__atomic_load_n(flag, __ATOMIC_RELAXED) &&
+                !__atomic_exchange_n(flag, (uint8_t)1, __ATOMIC_RELAXED))
+                marked++;
+        }
+    }
+    atomic_fetch_sub_explicit(&job->left, marked, memory_order_relaxed);
+}
+
+/* A row that searches its own set finds itself: marked first, which mostly leaves none to mark. */
+static void mark_own(void *data, size_t begin, size_t end, int32_t slot)
+{
+    (void)slot;
+    mark_job *job = data;
+    const bool own = job->rows->same && !job->rows->skip_self;
+    size_t left = 0;
+    for (size_t i = begin; i < end; i++) {
+        if (own && job->active[i])
+            job->source[i] = 1;
+        left += !job->source[i];
+    }
+    atomic_fetch_add_explicit(&job->left, left, memory_order_relaxed);
+}
+
+/* Makes the rows of the active queries and marks what they read. */
+static ascc_status demand_rows(ascc_network_run *run, int32_t key, const uint8_t *active,
+                               uint8_t *source)
+{
+    ascc_rows *rows = &run->rows[key];
+    const ascc_status status = ascc_rows_make(rows, run->tools, active);
+    if (status != ASCC_OK)
+        return status;
+    mark_job job = {.rows = rows, .active = active, .source = source};
+    ascc_workers_run(run->tools->workers, rows->source->count, 8192, mark_own, &job);
+    if (atomic_load(&job.left))
+        ascc_workers_run(run->tools->workers, rows->query->count, 1024, mark_neighbors, &job);
+    return ASCC_OK;
+}
+
+/* The rows of all fluid particles; the first list of an output also says what it reads of its source. */
+static ascc_status demand_output(ascc_network_run *run)
+{
+    const ascc_network *network = run->network;
+    const ascc_hierarchy *h = run->hierarchy;
+    const int32_t source = run->plan->output.term.source, set = ascc_network_set(network, source);
+    const int32_t *key = network->term_key[run->plan->term_count];
+    uint8_t *active = run->value[source].active;
+    for (size_t i = 0; i < h->fluid_count; i++)
+        active[set == ASCC_SET_FLUID ? i : h->whole[ASCC_SET_FLUID][i]] = 1;
+    if (key[0] < 0)
+        return ASCC_OK;
+    uint8_t *fluid = ascc_arena_lend(run->tools->arena, h->set[set].count, 1);
+    if (!fluid)
+        return ascc_fail(run->tools->message, ASCC_ERROR_MEMORY, "no memory for the last layer");
+    memcpy(fluid, active, h->set[set].count);
+    ascc_status status = demand_rows(run, key[0], fluid, active);
+    for (int i = 1; i < ASCC_MAX_LISTS && status == ASCC_OK && key[i] >= 0; i++)
+        status = ascc_rows_make(&run->rows[key[i]], run->tools, fluid);
+    return status;
+}
+
+static ascc_status demand_term(ascc_network_run *run, const ascc_layer *layer, int32_t t,
+                               const uint8_t *active)
+{
+    const int32_t source = run->plan->term[t].source, *key = run->network->term_key[t];
+    uint8_t *reads = run->value[source].active;
+    ascc_status status = ASCC_OK;
+    for (int i = 0; i < ASCC_MAX_LISTS && status == ASCC_OK && key[i] >= 0; i++)
+        status = demand_rows(run, key[i], active, reads);
+    if (key[0] >= 0)
+        return status;
+    const int32_t set = ascc_network_set(run->network, source);
+    for (size_t i = 0, j; i < run->hierarchy->set[layer->set].count; i++)
+        if (active[i] && ascc_network_shared_row(run->hierarchy, layer->set, set, i, &j))
+            reads[j] = 1;
+    return ASCC_OK;
+}
+
+static ascc_status demand_layer(ascc_network_run *run, int32_t l)
+{
+    const ascc_layer *layer = &run->plan->layer[l];
+    ascc_status status = ASCC_OK;
+    for (int32_t t = 0; t < layer->term_count && status == ASCC_OK; t++)
+        status = demand_term(run, layer, layer->first_term + t, run->value[l + 2].active);
+    return status;
+}
+
+ascc_status ascc_network_demand(ascc_network_run *run, const ascc_network *network,
+                                ascc_hierarchy *hierarchy, const ascc_search_tools *tools,
+                                size_t *expected)
+{
+    memset(run, 0, sizeof *run);
+    run->network = network;
+    run->plan = network->plan;
+    run->hierarchy = hierarchy;
+    run->tools = tools;
+    run->value = ascc_arena_take(tools->arena, (size_t)network->value_count, sizeof *run->value);
+    run->rows = ascc_arena_take(tools->arena, (size_t)network->key_count, sizeof *run->rows);
+    if (!run->value || !run->rows)
+        return ascc_fail(tools->message, ASCC_ERROR_MEMORY, "no memory for the network");
+    memset(run->value, 0, (size_t)network->value_count * sizeof *run->value);
+    if (!take_active(run))
+        return ascc_fail(tools->message, ASCC_ERROR_MEMORY, "no memory for the network");
+    ascc_status status = open_rows(run, expected);
+    if (status == ASCC_OK)
+        status = demand_output(run);
+    for (int32_t l = network->plan->layer_count - 1; status == ASCC_OK && l >= 0; l--)
+        status = demand_layer(run, l);
+    for (int32_t k = 0; status == ASCC_OK && k < network->key_count; k++) {
+        const ascc_rows *rows = &run->rows[k];
+        if (expected)
+            expected[k] = rows->used + rows->used / 8;
+        run->neighbor_count += rows->stored;
+        run->longest = rows->longest > run->longest ? rows->longest : run->longest;
+    }
+    return status;
+}

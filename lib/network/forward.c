@@ -1,0 +1,191 @@
+/* Layer by layer: what the rows that are needed are worth. SPDX-License-Identifier: MIT */
+#include <math.h>
+#include <string.h>
+
+#include "network.h"
+
+typedef struct layer_job {
+    const ascc_network_run *run;
+    const ascc_layer *layer;
+    ascc_value *value;
+    size_t width;         /* of a tile's row: what any term may write */
+    const uint32_t *list; /* active rows */
+    float *scratch; /* [slots][scratch_size]: columns, a tile of the layer, scratch of terms */
+    size_t scratch_size, tile_offset, term_offset;
+    ascc_scratch_sizes sizes;
+    uint32_t *sequence; /* 0, 1, 2, ... */
+} layer_job;
+
+ascc_scratch_sizes ascc_network_sizes(const ascc_network_run *run, const ascc_layer *layer)
+{
+    ascc_scratch_sizes sizes = {.room = ((size_t)run->longest + 15) / 8 * 8};
+    for (int32_t t = layer->first_term; t < layer->first_term + layer->term_count; t++) {
+        const ascc_term *term = &run->plan->term[t];
+        if (term->operation->scratch)
+            term->operation->scratch(run->plan, term, &sizes);
+    }
+    return sizes;
+}
+
+/* Stores one row of a value as its readers want it, filled up with zeros. */
+static void store_row(const ascc_value *value, size_t row, const float *from, int32_t channels)
+{
+    const size_t padded = ascc_padded(channels);
+    float *raw = value->raw ? value->raw + row * padded : NULL;
+    float *rectified = value->rectified ? value->rectified + row * padded : NULL;
+    for (size_t c = 0; c < padded; c++) {
+        const float x = c < (size_t)channels ? from[c] : 0.0f;
+        if (raw)
+            raw[c] = x;
+        if (rectified)
+            rectified[c] = x < 0.0f ? 0.0f : x;
+    }
+}
+
+static void compute_tiles(void *data, size_t begin, size_t end, int32_t slot)
+{
+    const layer_job *job = data;
+    float *scratch = job->scratch + (size_t)slot * job->scratch_size;
+    ascc_tile tile = {.run = job->run,
+                      .layer = job->layer,
+                      .sum = scratch + job->tile_offset,
+                      .width = job->width,
+                      .column = scratch,
+                      .scratch = scratch + job->term_offset,
+                      .room = job->sizes.room,
+                      .sequence = job->sequence};
+    for (size_t at = begin; at < end; at += ASCC_TILE_ROWS) {
+        tile.n = ascc_min_size(ASCC_TILE_ROWS, end - at);
+        tile.list = job->list + at;
+        memset(tile.sum, 0, tile.n * job->width * sizeof *tile.sum);
+        for (int32_t t = 0; t < job->layer->term_count; t++) {
+            const ascc_term *term = &job->run->plan->term[job->layer->first_term + t];
+            term->operation->forward(&tile, term);
+        }
+        for (size_t r = 0; r < tile.n; r++)
+            store_row(job->value, tile.list[r], tile.sum + r * job->width, job->layer->channels);
+    }
+}
+
+/* Room for a value as its readers want it. */
+static bool take_value(ascc_network_run *run, int32_t v)
+{
+    const size_t rows = run->hierarchy->set[ascc_network_set(run->network, v)].count;
+    const size_t channels = ascc_padded(ascc_network_channels(run->network, v));
+    ascc_value *value = &run->value[v];
+    if (run->network->wants[v] & ASCC_WANTS_RAW) {
+        value->raw = ascc_arena_take(run->tools->arena, rows, channels * sizeof(float));
+        if (!value->raw)
+            return false;
+    }
+    if (run->network->wants[v] & ASCC_WANTS_RECTIFIED) {
+        value->rectified = ascc_arena_take(run->tools->arena, rows, channels * sizeof(float));
+        if (!value->rectified)
+            return false;
+    }
+    return true;
+}
+
+typedef struct features_job {
+    const ascc_network_run *run;
+    int32_t value;
+    const float *features;
+} features_job;
+
+/* Features come in the host's order; values are in the order of the set. */
+static void place_features(void *data, size_t begin, size_t end, int32_t slot)
+{
+    (void)slot;
+    const features_job *job = data;
+    const int32_t v = job->value;
+    const ascc_hierarchy *h = job->run->hierarchy;
+    const int32_t channels = ascc_network_channels(job->run->network, v);
+    for (size_t i = begin; i < end; i++) {
+        const size_t row = h->origin[h->whole[v][i]] - (v == 0 ? 0 : h->fluid_count);
+        store_row(&job->run->value[v], i, job->features + row * (size_t)channels, channels);
+    }
+}
+
+typedef struct list_job {
+    const uint8_t *active;
+    uint32_t *list;
+    size_t part;
+    size_t first[ASCC_SORT_PARTS]; /* how many, then where the first goes */
+} list_job;
+
+static void count_active(void *data, size_t begin, size_t end, int32_t slot)
+{
+    (void)slot;
+    list_job *job = data;
+    size_t count = 0;
+    for (size_t i = begin; i < end; i++)
+        count += job->active[i];
+    job->first[begin / job->part] = count;
+}
+
+static void list_part(void *data, size_t begin, size_t end, int32_t slot)
+{
+    (void)slot;
+    const list_job *job = data;
+    uint32_t *next = job->list + job->first[begin / job->part];
+    for (size_t i = begin; i < end; i++)
+        if (job->active[i])
+            *next++ = (uint32_t)i;
+}
+
+/* Lists the active rows; returns how many. */
+static size_t list_active(const ascc_search_tools *tools, const uint8_t *active, size_t rows,
+                          uint32_t *list)
+{
+    list_job job = {.active = active, .list = list, .part = ascc_part_size(rows)};
+    ascc_workers_run(tools->workers, rows, job.part, count_active, &job);
+    const size_t count = ascc_part_sums(job.first);
+    ascc_workers_run(tools->workers, rows, job.part, list_part, &job);
+    return count;
+}
+
+static ascc_status compute_layer(ascc_network_run *run, int32_t l, uint32_t *list)
+{
+    const ascc_layer *layer = &run->plan->layer[l];
+    const ascc_search_tools *tools = run->tools;
+    layer_job job = {.run = run, .layer = layer, .value = &run->value[l + 2], .list = list};
+    const size_t slots = (size_t)ascc_workers_count(tools->workers);
+    job.sizes = ascc_network_sizes(run, layer);
+    job.width = ascc_padded(layer->channels) + 8;
+    job.tile_offset = ASCC_TILE_ROWS * (job.sizes.column + ASCC_COLUMN_PADDING);
+    job.term_offset = job.tile_offset + ASCC_TILE_ROWS * job.width;
+    job.scratch_size = job.term_offset + job.sizes.scratch;
+    const ascc_arena_mark mark = ascc_arena_mark_of(tools->arena);
+    job.sequence = ascc_arena_lend(tools->arena, job.sizes.room, sizeof *job.sequence);
+    for (size_t i = 0; job.sequence && i < job.sizes.room; i++)
+        job.sequence[i] = (uint32_t)i;
+    job.scratch = ascc_arena_lend(tools->arena, slots * job.scratch_size, sizeof(float));
+    if (!job.scratch || !job.sequence || !take_value(run, l + 2))
+        return ascc_fail(tools->message, ASCC_ERROR_MEMORY, "no memory for layer %s", layer->name);
+    const size_t count =
+        list_active(tools, run->value[l + 2].active, run->hierarchy->set[layer->set].count, list);
+    ascc_workers_run(tools->workers, count, ASCC_TILE_ROWS * 4, compute_tiles, &job);
+    ascc_arena_return(tools->arena, mark);
+    return ASCC_OK;
+}
+
+ascc_status ascc_network_forward(ascc_network_run *run, const float *fluid_features,
+                                 const float *boundary_features)
+{
+    const ascc_network *network = run->network;
+    size_t most = 0;
+    for (int s = 0; s < ASCC_MAX_SETS; s++)
+        most = ascc_max_size(most, run->hierarchy->set[s].count);
+    uint32_t *list = ascc_arena_lend(run->tools->arena, most, sizeof *list);
+    if (!list || !take_value(run, 0) || !take_value(run, 1))
+        return ascc_fail(run->tools->message, ASCC_ERROR_MEMORY, "no memory for the features");
+    for (int32_t v = 0; v < 2; v++) {
+        features_job job = {run, v, v == 0 ? fluid_features : boundary_features};
+        ascc_workers_run(run->tools->workers, run->hierarchy->set[v].count, 4096, place_features,
+                         &job);
+    }
+    ascc_status status = ASCC_OK;
+    for (int32_t l = 0; status == ASCC_OK && l < network->plan->layer_count; l++)
+        status = compute_layer(run, l, list);
+    return status;
+}

@@ -1,0 +1,37 @@
+/* What operations with one weight matrix and a bias have in common: packing, and the way back.
+ * SPDX-License-Identifier: MIT
+ *
+ * Packed: [length][padded outputs], length = cells * padded inputs, then the bias [padded outputs].
+ */
+#ifndef ASCC_MATRIX_H
+#define ASCC_MATRIX_H
+
+#include "network.h"
+#include "reverse.h"
+
+/* Of one row's column: what is multiplied with the matrix. */
+static inline size_t ascc_matrix_length(const ascc_term *term)
+{
+    return ascc_cell_count(&term->filter) * ascc_padded(term->inputs);
+}
+
+size_t ascc_matrix_packed_size(const ascc_plan *plan, const ascc_term *term);
+void ascc_matrix_pack(const ascc_plan *plan, const ascc_term *term, float *packed);
+void ascc_matrix_unpack(const ascc_plan *plan, const ascc_term *term, const float *packed,
+                        float *const gradient[ASCC_MAX_TENSORS]);
+
+/* [padded outputs][length] */
+void ascc_matrix_transpose(const ascc_plan *plan, const ascc_term *term, const float *packed,
+                           float *to);
+
+/* Adds the bias to the term's columns of a row. */
+void ascc_matrix_add_bias(const ascc_network_run *run, const ascc_term *term, float *row);
+
+/* pass->column_gradient[n][length] = the term's tile of gradients times the matrix, turned over. */
+void ascc_matrix_back(const ascc_reverse *pass, const ascc_term *term, size_t n);
+/* Row r of the tile read pass->column: keeps it for the next call. */
+void ascc_matrix_keep_column(const ascc_reverse *pass, const ascc_term *term, size_t r);
+/* Gradients of matrix and bias from n kept columns and the term's tile of gradients. */
+void ascc_matrix_back_weights(const ascc_reverse *pass, const ascc_term *term, size_t n);
+
+#endif

@@ -1,0 +1,157 @@
+/* A continuous convolution in a small basis: radial bumps times harmonics of the direction
+ * (docs/file-format.md). SPDX-License-Identifier: MIT */
+#include <math.h>
+#include <string.h>
+
+#include "column.h"
+#include "model/filter.h"
+
+static void read_basis(ascc_reader *reader, uint32_t object, const ascc_plan *plan, ascc_term *term,
+                       const char *name[ASCC_MAX_TENSORS])
+{
+    (void)plan;
+    ascc_filter_read_basis(reader, object, &term->filter, false);
+    ascc_convolution_read(reader, object, term, name);
+}
+
+static ascc_status check(ascc_plan_builder *builder, const ascc_layer *layer,
+                         ascc_term_entry *entry, const char *const name[ASCC_MAX_TENSORS])
+{
+    return ascc_convolution_check(builder, layer, entry, name, 4, ascc_filter_check_basis);
+}
+
+/* Two bumps reach a neighbour, beyond the last bump's centre one. */
+static double cost(const ascc_plan *plan, const ascc_cost_counts *counts, int32_t set,
+                   const ascc_term *term)
+{
+    const ascc_filter *f = &term->filter;
+    const double second = f->bumps > 1 ? pow(1.0 - 1.0 / f->bumps, plan->dimension) : 0.0;
+    return ascc_convolution_cost(plan, counts, set, term, f->cells[0] * (1.0 + second));
+}
+
+static void gather(const ascc_network_run *run, const ascc_term *term,
+                   const ascc_neighborhood *around, float *column)
+{
+    const ascc_kernels *kernels = run->tools->kernels;
+    const size_t harmonics = (size_t)term->filter.cells[0], bumps = (size_t)term->filter.bumps;
+    kernels->basis(&around->geometry.pairs, around->count, bumps, harmonics, around->factor,
+                   around->room);
+    kernels->gather_basis(around->factor, around->room, bumps, harmonics, around->read,
+                          around->count, around->feature, ascc_padded(term->inputs), column);
+}
+
+static void forward(const ascc_tile *tile, const ascc_term *term)
+{
+    ascc_column_forward(tile, term, gather);
+}
+
+/* ---- The way back ---- */
+
+static void scatter(const ascc_reverse *pass, const ascc_term *term,
+                    const ascc_neighborhood *around, const uint32_t *write,
+                    const float *column_gradient, float *gradient)
+{
+    pass->run->tools->kernels->scatter(around->factor, around->room, (size_t)term->filter.bumps,
+                                       (size_t)term->filter.cells[0], write, around->count,
+                                       column_gradient, ascc_padded(term->inputs), gradient);
+}
+
+/* Harmonics of a direction and their derivatives by its coordinates. */
+static void harmonics_at(const double u[3], size_t harmonics, double by[9][3])
+{
+    const double root3 = 1.7320508075688772, x = u[0], y = u[1], z = u[2];
+    memset(by, 0, 9 * sizeof *by);
+    for (size_t h = 1; h < 4 && h < harmonics; h++)
+        by[h][h - 1] = harmonics == 3 || harmonics == 5 ? (h < 3) : 1.0;
+    if (harmonics == 5) {
+        memset(by[3], 0, sizeof by[3]);
+        by[3][0] = 2.0 * y;
+        by[3][1] = 2.0 * x;
+        by[4][0] = 2.0 * x;
+        by[4][1] = -2.0 * y;
+    }
+    if (harmonics == 9) {
+        by[4][0] = root3 * y;
+        by[4][1] = root3 * x;
+        by[5][1] = root3 * z;
+        by[5][2] = root3 * y;
+        by[6][2] = root3 * x;
+        by[6][0] = root3 * z;
+        by[7][0] = root3 * x;
+        by[7][1] = -root3 * y;
+        by[8][0] = -x;
+        by[8][1] = -y;
+        by[8][2] = 2.0 * z;
+    }
+}
+
+/* The gradient of the displacement of one pair of a basis, from the gradients of its members. */
+static void place_pair(const ascc_reverse *pass, const ascc_filter *filter,
+                       const ascc_neighborhood *around, size_t k, const double r[3], double g[3])
+{
+    const size_t harmonics = (size_t)filter->cells[0], room = around->room;
+    const double distance = sqrt(r[0] * r[0] + r[1] * r[1] + r[2] * r[2]);
+    double by[9][3], by_rho = 0.0, by_u[3] = {0.0, 0.0, 0.0}, along = 0.0, u[3];
+    g[0] = g[1] = g[2] = 0.0;
+    if (distance == 0.0)
+        return; /* the centre: bumps are flat there, and there is no direction */
+    for (int c = 0; c < 3; c++)
+        u[c] = r[c] / distance;
+    harmonics_at(u, harmonics, by);
+    for (size_t b = 0; b < (size_t)filter->bumps; b++) {
+        const double t = filter->bumps * distance / filter->radius - (double)b, s = 1.0 - t * t;
+        if (s <= 0.0)
+            continue;
+        const float *dot = pass->dot + b * harmonics * room + k;
+        const float *factor = around->factor + b * harmonics * room + k;
+        const double bump = s * s, slope = -4.0 * t * s * filter->bumps;
+        for (size_t h = 0; h < harmonics; h++) {
+            const double e = (double)dot[h * room];
+            by_rho += e * slope * ((double)factor[h * room] / bump);
+            for (int c = 0; h > 0 && c < 3; c++)
+                by_u[c] += e * bump * by[h][c];
+        }
+    }
+    for (int c = 0; c < 3; c++)
+        along += by_u[c] * u[c];
+    for (int c = 0; c < 3; c++)
+        g[c] = by_rho * u[c] / filter->radius + (by_u[c] - along * u[c]) / distance;
+}
+
+static void places(const ascc_reverse *pass, const ascc_term *term, const ascc_neighborhood *around,
+                   size_t row, const float *column_gradient)
+{
+    const ascc_rows *rows = ascc_term_list(pass->run, term, 0);
+    pass->run->tools->kernels->dot(column_gradient, ascc_cell_count(&term->filter), around->read,
+                                   around->count, around->feature, ascc_padded(term->inputs),
+                                   pass->dot, around->room);
+    for (size_t k = 0; k < around->count; k++) {
+        double r[3], g[3];
+        ascc_seen_displacement(pass->run, rows, row, around->neighbor[k], r);
+        place_pair(pass, &term->filter, around, k, r, g);
+        ascc_column_add_displacement(pass, term, row, around->neighbor[k], g);
+    }
+}
+
+static void backward(const ascc_reverse *pass, const ascc_layer *layer, const ascc_term *term,
+                     const uint32_t *list, size_t n)
+{
+    (void)layer;
+    ascc_column_backward(pass, term, list, n, gather, scatter, places);
+}
+
+const ascc_operation ascc_op_basis = {.name = "convolution in a basis",
+                                      .type = "convolution",
+                                      .with = "basis",
+                                      .read = read_basis,
+                                      .check = check,
+                                      .lists = ascc_convolution_lists,
+                                      .packed_size = ascc_matrix_packed_size,
+                                      .pack = ascc_matrix_pack,
+                                      .unpack = ascc_matrix_unpack,
+                                      .transpose = ascc_matrix_transpose,
+                                      .cost = cost,
+                                      .scratch = ascc_column_scratch,
+                                      .reads_features = ascc_convolution_reads_features,
+                                      .forward = forward,
+                                      .backward = backward};

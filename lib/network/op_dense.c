@@ -1,0 +1,93 @@
+/* A dense layer on each row, from a row that the source's set shares with the layer's.
+ * SPDX-License-Identifier: MIT */
+#include <math.h>
+#include <string.h>
+
+#include "matrix.h"
+#include "model/cost.h"
+
+static void read_dense(ascc_reader *reader, uint32_t object, const ascc_plan *plan, ascc_term *term,
+                       const char *name[ASCC_MAX_TENSORS])
+{
+    (void)plan;
+    (void)term;
+    name[ASCC_TENSOR_WEIGHT] = ascc_reader_text(reader, object, "weight");
+    name[ASCC_TENSOR_BIAS] = ascc_reader_optional_text(reader, object, "bias");
+}
+
+static ascc_status check(ascc_plan_builder *builder, const ascc_layer *layer,
+                         ascc_term_entry *entry, const char *const name[ASCC_MAX_TENSORS])
+{
+    entry->term.filter = (ascc_filter){.cells = {1, 1, 1}};
+    ascc_status status = ascc_plan_check_shared(builder, layer, &entry->term);
+    if (status == ASCC_OK)
+        status = ascc_plan_check_matrix(builder, entry, name[ASCC_TENSOR_WEIGHT]);
+    return status == ASCC_OK ? ascc_plan_check_bias(builder, entry, name[ASCC_TENSOR_BIAS])
+                             : status;
+}
+
+static double cost(const ascc_plan *plan, const ascc_cost_counts *counts, int32_t set,
+                   const ascc_term *term)
+{
+    const double own = ascc_cost_points(counts, set);
+    const double from = ascc_cost_points(counts, ascc_plan_value_set(plan->layer, term->source));
+    return fmin(own, from) * term->inputs * term->outputs;
+}
+
+static void scratch(const ascc_plan *plan, const ascc_term *term, ascc_scratch_sizes *sizes)
+{
+    (void)plan;
+    sizes->column = ascc_max_size(sizes->column, ascc_padded(term->inputs));
+}
+
+static void forward(const ascc_tile *tile, const ascc_term *term)
+{
+    const ascc_network_run *run = tile->run;
+    const int32_t set = ascc_network_set(run->network, term->source);
+    const size_t a = ascc_padded(term->inputs);
+    const float *source = ascc_term_source(run, term);
+    for (size_t r = 0, j; r < tile->n; r++) {
+        if (!ascc_network_shared_row(run->hierarchy, tile->layer->set, set, tile->list[r], &j))
+            continue;
+        float *row = tile->sum + r * tile->width + term->column;
+        ascc_matrix_add_bias(run, term, row);
+        run->tools->kernels->multiply(source + j * a, a, 1, a, ascc_term_packed(run, term),
+                                      ascc_padded(term->outputs), row, tile->width);
+    }
+}
+
+static void backward(const ascc_reverse *pass, const ascc_layer *layer, const ascc_term *term,
+                     const uint32_t *list, size_t n)
+{
+    const ascc_network_run *run = pass->run;
+    const int32_t set = ascc_network_set(run->network, term->source);
+    const size_t a = ascc_padded(term->inputs), b = ascc_padded(term->outputs);
+    const float *source = ascc_term_source(run, term);
+    float *gradient = ascc_reverse_source(pass, term);
+    ascc_matrix_back(pass, term, n);
+    for (size_t r = 0, j; r < n; r++) {
+        if (ascc_network_shared_row(run->hierarchy, layer->set, set, list[r], &j)) {
+            for (size_t c = 0; gradient && c < a; c++)
+                gradient[j * a + c] += pass->column_gradient[r * a + c];
+            memcpy(pass->column, source + j * a, a * sizeof(float));
+        } else { /* this row has no such term */
+            memset(pass->tile + r * b, 0, b * sizeof(float));
+            memset(pass->column, 0, a * sizeof(float));
+        }
+        ascc_matrix_keep_column(pass, term, r);
+    }
+    ascc_matrix_back_weights(pass, term, n);
+}
+
+const ascc_operation ascc_op_dense = {.name = "dense",
+                                      .type = "dense",
+                                      .read = read_dense,
+                                      .check = check,
+                                      .packed_size = ascc_matrix_packed_size,
+                                      .pack = ascc_matrix_pack,
+                                      .unpack = ascc_matrix_unpack,
+                                      .transpose = ascc_matrix_transpose,
+                                      .cost = cost,
+                                      .scratch = scratch,
+                                      .forward = forward,
+                                      .backward = backward};

@@ -1,0 +1,116 @@
+/* A continuous convolution with its kernel on a grid (paper Eq. 1). SPDX-License-Identifier: MIT */
+#include "column.h"
+#include "cube.h"
+#include "model/filter.h"
+
+static void read_grid(ascc_reader *reader, uint32_t object, const ascc_plan *plan, ascc_term *term,
+                      const char *name[ASCC_MAX_TENSORS])
+{
+    (void)plan;
+    ascc_filter_read_grid(reader, object, &term->filter);
+    ascc_convolution_read(reader, object, term, name);
+}
+
+static ascc_status find_cells(ascc_plan_builder *builder, const ascc_tensor *tensor,
+                              ascc_filter *filter)
+{
+    return ascc_plan_check_cells(builder, tensor, -1, filter->cells);
+}
+
+static ascc_status check(ascc_plan_builder *builder, const ascc_layer *layer,
+                         ascc_term_entry *entry, const char *const name[ASCC_MAX_TENSORS])
+{
+    return ascc_convolution_check(builder, layer, entry, name, 5, find_cells);
+}
+
+static double cost(const ascc_plan *plan, const ascc_cost_counts *counts, int32_t set,
+                   const ascc_term *term)
+{
+    return ascc_convolution_cost(plan, counts, set, term, plan->dimension == 2 ? 4.0 : 8.0);
+}
+
+static void gather(const ascc_network_run *run, const ascc_term *term,
+                   const ascc_neighborhood *around, float *column)
+{
+    run->tools->kernels->gather(&around->geometry.pairs, around->geometry.window, around->read,
+                                around->count, around->feature, ascc_padded(term->inputs),
+                                term->filter.cells, column);
+}
+
+static void forward(const ascc_tile *tile, const ascc_term *term)
+{
+    ascc_column_forward(tile, term, gather);
+}
+
+/* ---- The way back ---- */
+
+static void scatter(const ascc_reverse *pass, const ascc_term *term,
+                    const ascc_neighborhood *around, const uint32_t *write,
+                    const float *column_gradient, float *gradient)
+{
+    (void)pass;
+    const size_t a = ascc_padded(term->inputs);
+    const ascc_pairs *pairs = &around->geometry.pairs;
+    for (size_t k = 0; k < around->count; k++) {
+        const double at[3] = {(double)pairs->x[k], (double)pairs->y[k], (double)pairs->z[k]};
+        const double window = around->geometry.window ? (double)around->geometry.window[k] : 1.0;
+        ascc_trilinear t;
+        ascc_trilinear_at(term->filter.cells, at, &t);
+        float *to = gradient + write[k] * a;
+        for (int n = 0; n < t.count; n++) {
+            const float w = (float)(t.weight[n] * window);
+            const float *from = column_gradient + t.cell[n] * a;
+            for (size_t c = 0; c < a; c++)
+                to[c] += w * from[c];
+        }
+    }
+}
+
+static void places(const ascc_reverse *pass, const ascc_term *term, const ascc_neighborhood *around,
+                   size_t row, const float *column_gradient)
+{
+    const size_t a = ascc_padded(term->inputs);
+    const ascc_rows *rows = ascc_term_list(pass->run, term, 0);
+    for (size_t k = 0; k < around->count; k++) {
+        double r[3], g[3] = {0.0, 0.0, 0.0};
+        ascc_place_in_cube at;
+        ascc_trilinear t;
+        ascc_seen_displacement(pass->run, rows, row, around->neighbor[k], r);
+        ascc_place_in_cube_of(&term->filter, r, &at);
+        ascc_trilinear_at(term->filter.cells, at.at, &t);
+        const float *f = around->feature + around->read[k] * a;
+        for (int n = 0; n < t.count; n++) {
+            double e = 0.0;
+            for (size_t c = 0; c < a; c++)
+                e += (double)column_gradient[t.cell[n] * a + c] * (double)f[c];
+            for (int c = 0; c < 3; c++) {
+                g[c] += e * t.weight[n] * at.window_slope[c];
+                for (int i = 0; i < 3; i++)
+                    g[c] += e * at.window * t.slope[n][i] * at.slope[i][c];
+            }
+        }
+        ascc_column_add_displacement(pass, term, row, around->neighbor[k], g);
+    }
+}
+
+static void backward(const ascc_reverse *pass, const ascc_layer *layer, const ascc_term *term,
+                     const uint32_t *list, size_t n)
+{
+    (void)layer;
+    ascc_column_backward(pass, term, list, n, gather, scatter, places);
+}
+
+const ascc_operation ascc_op_grid = {.name = "convolution on a grid",
+                                     .type = "convolution",
+                                     .read = read_grid,
+                                     .check = check,
+                                     .lists = ascc_convolution_lists,
+                                     .packed_size = ascc_matrix_packed_size,
+                                     .pack = ascc_matrix_pack,
+                                     .unpack = ascc_matrix_unpack,
+                                     .transpose = ascc_matrix_transpose,
+                                     .cost = cost,
+                                     .scratch = ascc_column_scratch,
+                                     .reads_features = ascc_convolution_reads_features,
+                                     .forward = forward,
+                                     .backward = backward};

@@ -1,0 +1,628 @@
+/* An antisymmetric output in a radial basis: pairs pushed and damped along the line between them, and
+ * walls likewise (docs/file-format.md). SPDX-License-Identifier: MIT
+ *
+ * The strength of a pair is linear in what the two particles hold, so each particle is multiplied with all
+ * bumps once, and a pair costs its bumps. Packed: a part for each tensor, [padded inputs][8 bumps].
+ */
+#include <math.h>
+#include <string.h>
+
+#include "column.h"
+#include "model/cost.h"
+#include "model/filter.h"
+#include "pair_reverse.h"
+#include "pair_sum.h"
+
+/* The parts are the tensors: strengths and dampings of fluid pairs and of walls. */
+#define PARTS ASCC_MAX_TENSORS
+
+static const ascc_filter *filter_of(const ascc_output *output, int part)
+{
+    return part < ASCC_TENSOR_WALL ? &output->term.filter : &output->walls;
+}
+
+static void read_pairs(ascc_reader *reader, uint32_t object, const ascc_plan *plan, ascc_term *term,
+                       const char *name[ASCC_MAX_TENSORS])
+{
+    static const char *const directions[] = {"current"};
+    (void)plan;
+    ascc_output *output = (ascc_output *)term; /* its first member */
+    name[ASCC_TENSOR_STRENGTH] = ascc_reader_text(reader, object, "kernel");
+    ascc_filter_read_basis(reader, object, &term->filter, true);
+    if (ascc_reader_has(reader, object, "direction"))
+        output->current_direction =
+            1 + ascc_reader_choice(reader, object, "direction", directions, 1);
+    name[ASCC_TENSOR_DAMPING] = ascc_reader_optional_text(reader, object, "damping");
+    if (ascc_reader_has(reader, object, "limit"))
+        output->limit = ascc_reader_number(reader, object, "limit", 1e-30, ASCC_PLAN_MAX);
+    if (!ascc_reader_has(reader, object, "walls"))
+        return;
+    const uint32_t walls = ascc_reader_object(reader, object, "walls");
+    ascc_reader_where(reader, "output 'walls'");
+    output->has_walls = 1;
+    name[ASCC_TENSOR_WALL] = ascc_reader_text(reader, walls, "kernel");
+    name[ASCC_TENSOR_WALL_DAMPING] = ascc_reader_optional_text(reader, walls, "damping");
+    if (ascc_reader_has(reader, walls, "basis"))
+        ascc_filter_read_basis(reader, walls, &output->walls, true);
+    else
+        ascc_reader_fail(reader, "a basis is missing");
+    if (ascc_reader_has(reader, walls, "contact"))
+        output->contact = ascc_reader_number(reader, walls, "contact", 0.0, output->walls.radius);
+    ascc_reader_end(reader, walls);
+    ascc_reader_where(reader, "output");
+}
+
+#define FAIL(...) ascc_fail(builder->message, ASCC_ERROR_FORMAT, __VA_ARGS__)
+
+/* What needs one particle's values for each fluid row. */
+static ascc_status check_options(ascc_plan_builder *builder, const ascc_term *term,
+                                 const char *const name[ASCC_MAX_TENSORS])
+{
+    const ascc_output *output = &builder->plan.output;
+    const bool damped = name[ASCC_TENSOR_DAMPING] || name[ASCC_TENSOR_WALL_DAMPING];
+    const int32_t set = ascc_plan_value_set(builder->layer, term->source);
+    for (int32_t i = 1; i < builder->plan.dimension; i++)
+        if (output->scale[i] != output->scale[0])
+            return FAIL("output: with a basis 'scale' must be the same in all directions");
+    if ((output->has_walls || damped || output->current_direction) && set != ASCC_SET_FLUID)
+        return FAIL(
+            "output: 'walls', 'damping' and 'direction' need a source on the points 'fluid'");
+    if (damped && (!term->rectify || ascc_plan_motion(&builder->plan, 0) < 0))
+        return FAIL("output: 'damping' needs 'relu' and the feature 'motion'");
+    return ASCC_OK;
+}
+
+static ascc_status check(ascc_plan_builder *builder, const ascc_layer *layer,
+                         ascc_term_entry *entry, const char *const name[ASCC_MAX_TENSORS])
+{
+    (void)layer;
+    ascc_term *term = &entry->term;
+    ascc_output *output = &builder->plan.output;
+    output->conserves = output->central = 1;
+    term->filter.skip_self = 1;
+    term->outputs = builder->plan.dimension;
+    ascc_status status = ascc_plan_check_filter(builder, &term->filter, "output");
+    if (status == ASCC_OK && output->has_walls)
+        status = ascc_plan_check_filter(builder, &output->walls, "output 'walls'");
+    for (int part = 0; part < PARTS && status == ASCC_OK; part++)
+        if (name[part])
+            status = ascc_filter_check_central(
+                builder, term->inputs, part < ASCC_TENSOR_WALL ? &term->filter : &output->walls,
+                name[part], &entry->tensor[part]);
+    return status == ASCC_OK ? check_options(builder, term, name) : status;
+}
+
+static int lists(const ascc_plan *plan, const ascc_term *term, int32_t set,
+                 ascc_list_key key[ASCC_MAX_LISTS])
+{
+    key[0] = (ascc_list_key){.query = set,
+                             .source = set,
+                             .limit = term->filter.neighbor_limit,
+                             .radius = term->filter.radius};
+    key[1] = (ascc_list_key){.query = ASCC_SET_FLUID,
+                             .source = ASCC_SET_BOUNDARY,
+                             .limit = plan->output.walls.neighbor_limit,
+                             .radius = plan->output.walls.radius};
+    return plan->output.has_walls ? 2 : 1;
+}
+
+/* ---- Weights ---- */
+
+static size_t part_size(const ascc_term *term)
+{
+    return ascc_padded(term->inputs) * ASCC_MAX_BUMPS;
+}
+
+static size_t packed_size(const ascc_plan *plan, const ascc_term *term)
+{
+    (void)plan;
+    return PARTS * part_size(term);
+}
+
+static void pack(const ascc_plan *plan, const ascc_term *term, float *packed)
+{
+    const size_t a = (size_t)term->inputs;
+    for (int part = 0; part < PARTS; part++, packed += part_size(term)) {
+        const float *from = term->tensor[part];
+        for (int32_t k = 0; from && k < filter_of(&plan->output, part)->bumps; k++)
+            for (size_t i = 0; i < a; i++)
+                packed[i * ASCC_MAX_BUMPS + (size_t)k] = from[(size_t)k * a + i];
+    }
+}
+
+static void unpack(const ascc_plan *plan, const ascc_term *term, const float *packed,
+                   float *const gradient[ASCC_MAX_TENSORS])
+{
+    const size_t a = (size_t)term->inputs;
+    for (int part = 0; part < PARTS; part++, packed += part_size(term)) {
+        float *to = gradient[part];
+        for (int32_t k = 0; to && k < filter_of(&plan->output, part)->bumps; k++)
+            for (size_t i = 0; i < a; i++)
+                to[(size_t)k * a + i] += packed[i * ASCC_MAX_BUMPS + (size_t)k];
+    }
+}
+
+static void transpose(const ascc_plan *plan, const ascc_term *term, const float *packed, float *to)
+{
+    (void)plan;
+    for (int part = 0; part < PARTS; part++, packed += part_size(term), to += part_size(term))
+        ascc_transpose(packed, ascc_padded(term->inputs), ASCC_MAX_BUMPS, to);
+}
+
+static double cost(const ascc_plan *plan, const ascc_cost_counts *counts, int32_t set,
+                   const ascc_term *term)
+{
+    int32_t bumps = 0;
+    for (int part = 0; part < PARTS; part++)
+        bumps += term->tensor[part] ? filter_of(&plan->output, part)->bumps : 0;
+    return ascc_cost_points(counts, set) * bumps * term->inputs;
+}
+
+static bool is_damped(const ascc_term *term)
+{
+    return term->tensor[ASCC_TENSOR_DAMPING] || term->tensor[ASCC_TENSOR_WALL_DAMPING];
+}
+
+static void scratch(const ascc_plan *plan, const ascc_term *term, ascc_scratch_sizes *sizes)
+{
+    sizes->column = (size_t)plan->dimension * sizeof(int64_t);
+    for (int part = 0; part < PARTS; part++)
+        sizes->column += term->tensor[part] ? ASCC_MAX_BUMPS * sizeof(float) : 0;
+    if (plan->output.current_direction)
+        sizes->column += 3 * sizeof(double);
+}
+
+/* ---- Coefficients: what each particle gives each bump ---- */
+
+typedef struct coefficients {
+    const ascc_network_run *run;
+    const ascc_impulse_scale *scale;
+    float *part[PARTS];  /* [set rows][8], NULL = not there */
+    const double *place; /* [set rows][3] positions that directions come from, else NULL */
+} coefficients;
+
+/* Of the rows that are active, stretch by stretch. */
+static void compute_coefficients(void *data, size_t begin, size_t end, int32_t slot)
+{
+    (void)slot;
+    const coefficients *job = data;
+    const ascc_term *term = &job->run->plan->output.term;
+    const size_t a = ascc_padded(term->inputs);
+    const uint8_t *active = job->run->value[term->source].active;
+    const float *value = ascc_term_source(job->run, term);
+    const float *packed = ascc_term_packed(job->run, term);
+    for (size_t i = begin, stop; i < end; i = stop) {
+        for (stop = i + 1; stop < end && active[i] && active[stop];)
+            stop++;
+        for (int part = 0; part < PARTS; part++) {
+            float *to = job->part[part] ? job->part[part] + i * ASCC_MAX_BUMPS : NULL;
+            if (to)
+                memset(to, 0, (stop - i) * ASCC_MAX_BUMPS * sizeof *to);
+            if (to && active[i])
+                job->run->tools->kernels->multiply(value + i * a, a, stop - i, a,
+                                                   packed + (size_t)part * part_size(term),
+                                                   ASCC_MAX_BUMPS, to, ASCC_MAX_BUMPS);
+        }
+    }
+}
+
+/* take: ascc_arena_take or ascc_arena_lend. */
+static bool find_coefficients(coefficients *c, const ascc_network_run *run, ascc_arena *arena,
+                              void *(*take)(ascc_arena *, size_t, size_t))
+{
+    const ascc_term *term = &run->plan->output.term;
+    const size_t count = run->hierarchy->set[ascc_network_set(run->network, term->source)].count;
+    c->run = run;
+    for (int part = 0; part < PARTS; part++) {
+        c->part[part] =
+            term->tensor[part] ? take(arena, count, ASCC_MAX_BUMPS * sizeof(float)) : NULL;
+        if (term->tensor[part] && !c->part[part])
+            return false;
+    }
+    ascc_workers_run(run->tools->workers, count, 1024, compute_coefficients, c);
+    return true;
+}
+
+/* Positions before the step, in the order of the set. */
+static bool find_places(coefficients *c, const ascc_pair_sum *sum)
+{
+    const size_t d = (size_t)c->run->plan->dimension;
+    const size_t count = c->run->hierarchy->set[sum->set].count;
+    double *place = ascc_arena_lend(c->run->tools->arena, count, 3 * sizeof *place);
+    for (size_t i = 0; place && i < count; i++) {
+        const size_t row = ascc_hierarchy_host_row(c->run->hierarchy, sum->set, i);
+        for (size_t k = 0; k < 3; k++)
+            place[i * 3 + k] = k < d ? c->scale->position[row * d + k] : 0.0;
+    }
+    c->place = place;
+    return place != NULL;
+}
+
+/* ---- Pairs ---- */
+
+/* What the bumps make of a pair. */
+typedef struct strengths {
+    float strength[ASCC_PAIR_BATCH]; /* along the line from the row to the neighbour */
+    float damping[ASCC_PAIR_BATCH];
+} strengths;
+
+/* Scales by the cosine between the displacement before the step, d of these squares, and the one that the
+ * network sees. */
+static void turn_strengths(const ascc_pair_sum *sum, size_t i, const ascc_pair_batch *b,
+                           ascc_pair_impulses d, const double square[ASCC_PAIR_BATCH],
+                           float *strength)
+{
+    double seen[3][ASCC_PAIR_BATCH], seen_square[ASCC_PAIR_BATCH];
+    ascc_pair_displacements(sum->rows, NULL, i, b, seen, seen_square);
+    for (size_t k = 0; k < b->count; k++) {
+        const double lengths = sqrt(seen_square[k] * square[k]);
+        const double along = d[0][k] * seen[0][k] + d[1][k] * seen[1][k] + d[2][k] * seen[2][k];
+        strength[k] *= lengths > 0.0 ? (float)(along / lengths) : 0.0f;
+    }
+}
+
+/* Turns pair strengths into vectors along the displacements t, of these squares: subtracts damping times
+ * approach speed, clamps. Coincident pairs give 0. fluid: both move; walls have no velocity. */
+static void point_strengths(const ascc_pair_sum *sum, size_t i, const ascc_pair_batch *b,
+                            const strengths *s, bool damped, bool fluid,
+                            const double square[ASCC_PAIR_BATCH], ascc_pair_impulses t)
+{
+    const ascc_plan *plan = sum->run->plan;
+    const coefficients *c = sum->data;
+    const int32_t d = plan->dimension;
+    const double factor = c->scale->factor[0], limit = ascc_output_limit(&plan->output);
+    const size_t width = ascc_padded(plan->fluid_channels);
+    const float *motion = damped ? sum->run->value[0].raw + ascc_plan_motion(plan, 0) : NULL;
+    const float *own = damped ? motion + i * width : NULL;
+    for (size_t k = 0; k < b->count; k++) {
+        const double length = sqrt(square[k]), inverse = length > 0.0 ? 1.0 / length : 0.0;
+        double strength = (double)s->strength[k];
+        if (damped) {
+            const float *other = fluid ? motion + b->neighbor[k] * width : NULL;
+            double approach = 0.0;
+            for (int32_t n = 0; n < d; n++)
+                approach += ((double)own[n] - (other ? (double)other[n] : 0.0)) * t[n][k];
+            strength -= (double)s->damping[k] * (approach * inverse);
+        }
+        strength = strength > limit ? limit : strength < -limit ? -limit : strength;
+        const double share = strength * factor * inverse;
+        for (int n = 0; n < 3; n++)
+            t[n][k] *= share;
+    }
+}
+
+static void evaluate(ascc_pair_sum *sum, size_t i, ascc_pair_batch *b)
+{
+    const ascc_network_run *run = sum->run;
+    const coefficients *c = sum->data;
+    const ascc_filter *filter = &run->plan->output.term.filter;
+    float geometry[ASCC_GEOMETRY_ARRAYS * ASCC_PAIR_BATCH];
+    double t[3][ASCC_PAIR_BATCH], square[ASCC_PAIR_BATCH];
+    strengths s;
+    size_t count = b->count;
+    for (; count % 8; count++)
+        b->neighbor[count] = b->neighbor[0];
+    const ascc_geometry g =
+        ascc_geometry_of(run, sum->rows, filter, i, b->neighbor, count, geometry, ASCC_PAIR_BATCH);
+    for (int part = ASCC_TENSOR_STRENGTH; part <= ASCC_TENSOR_DAMPING; part++)
+        if (c->part[part])
+            run->tools->kernels->pair_strengths(
+                g.pairs.distance, b->neighbor, b->count, c->part[part] + i * ASCC_MAX_BUMPS,
+                c->part[part], (size_t)filter->bumps,
+                part == ASCC_TENSOR_STRENGTH ? s.strength : s.damping);
+    ascc_pair_displacements(sum->rows, c->place, i, b, t, square);
+    if (c->place)
+        turn_strengths(sum, i, b, t, square, s.strength);
+    point_strengths(sum, i, b, &s, c->part[ASCC_TENSOR_DAMPING] != NULL, true, square, t);
+    for (int n = 0; n < 3; n++)
+        for (size_t k = 0; k < b->count; k++)
+            t[n][k] *= sum->uniform ? sum->mass[i]
+                                    : ascc_pair_mass(sum->mass[i], sum->mass[b->neighbor[k]]);
+    ascc_pair_sum_add(sum, i, b, t);
+}
+
+static void evaluate_walls(ascc_pair_sum *sum, size_t i, ascc_pair_batch *b)
+{
+    static const float nothing[ASCC_MAX_BUMPS];
+    static const uint32_t nobody[ASCC_PAIR_BATCH];
+    const ascc_network_run *run = sum->run;
+    const coefficients *c = sum->data;
+    const ascc_filter *filter = &run->plan->output.walls;
+    float geometry[ASCC_GEOMETRY_ARRAYS * ASCC_PAIR_BATCH];
+    double t[3][ASCC_PAIR_BATCH], square[ASCC_PAIR_BATCH];
+    strengths s;
+    const ascc_geometry g = ascc_geometry_of(run, sum->rows, filter, i, b->neighbor, b->count,
+                                             geometry, ASCC_PAIR_BATCH);
+    for (int part = ASCC_TENSOR_WALL; part <= ASCC_TENSOR_WALL_DAMPING; part++)
+        if (c->part[part])
+            run->tools->kernels->pair_strengths(
+                g.pairs.distance, nobody, b->count, c->part[part] + i * ASCC_MAX_BUMPS, nothing,
+                (size_t)filter->bumps, part == ASCC_TENSOR_WALL ? s.strength : s.damping);
+    ascc_pair_displacements(sum->rows, NULL, i, b, t, square);
+    point_strengths(sum, i, b, &s, c->part[ASCC_TENSOR_WALL_DAMPING] != NULL, false, square, t);
+    for (int n = 0; n < 3; n++)
+        for (size_t k = 0; k < b->count; k++)
+            t[n][k] *= sum->mass[i];
+    ascc_pair_sum_add_walls(sum, i, b, t);
+}
+
+static ascc_status impulses(const ascc_network_run *run, const ascc_impulse_scale *scale,
+                            const ascc_impulses *to, uint64_t *pair_count)
+{
+    const ascc_output *output = &run->plan->output;
+    const ascc_term *term = &output->term;
+    coefficients c = {.scale = scale};
+    ascc_pair_sum sum;
+    const ascc_status status =
+        ascc_pair_sum_open(&sum, run, ascc_network_set(run->network, term->source), scale->mass,
+                           (size_t)run->plan->dimension);
+    if (status != ASCC_OK)
+        return status;
+    if (!find_coefficients(&c, run, run->tools->arena, ascc_arena_lend) ||
+        (output->current_direction && !find_places(&c, &sum)))
+        return ascc_fail(run->tools->message, ASCC_ERROR_MEMORY, "no memory for the impulses");
+    sum.data = &c;
+    sum.skip_coincident = !c.place;
+    ascc_pair_sum_run(&sum, ascc_term_list(run, term, 0), evaluate);
+    if (output->has_walls)
+        ascc_pair_sum_run_walls(&sum, ascc_term_list(run, term, 1), to->wall, evaluate_walls);
+    return ascc_pair_sum_give(&sum, ascc_term_source(run, term), ascc_padded(term->inputs), to,
+                              pair_count);
+}
+
+/* ---- The way back ---- */
+
+/* What the visitor of pairs reads and adds to. */
+typedef struct gradients {
+    coefficients c;
+    float *part[PARTS]; /* [row][8] */
+} gradients;
+
+/* The two bumps that a distance lies in. */
+typedef struct bumps_at {
+    size_t first, count;
+    double value[2], slope[2]; /* slope: by rho */
+} bumps_at;
+
+static bumps_at find_bumps(double rho, int32_t bumps)
+{
+    bumps_at at = {.count = 0};
+    const double x = rho * bumps;
+    at.first = (size_t)x;
+    for (size_t k = at.first; k < (size_t)bumps && k < at.first + 2; k++) {
+        const double t = x - (double)k, u = 1.0 - t * t;
+        at.value[at.count] = u * u;
+        at.slope[at.count++] = -4.0 * t * u * bumps;
+    }
+    return at;
+}
+
+/* Sum over bumps of what row i and, unless it is a wall, row j give. */
+static double strength_of(const ascc_pair_reverse *q, int part, size_t i, size_t j, bool both,
+                          const bumps_at *at, double *slope)
+{
+    double sum = 0.0;
+    *slope = 0.0;
+    const float *share = ((const gradients *)q->data)->c.part[part];
+    if (!share)
+        return 0.0;
+    for (size_t k = 0; k < at->count; k++) {
+        const double a = (double)share[i * ASCC_MAX_BUMPS + at->first + k] +
+                         (both ? (double)share[j * ASCC_MAX_BUMPS + at->first + k] : 0.0);
+        sum += at->value[k] * a;
+        *slope += at->slope[k] * a;
+    }
+    return sum;
+}
+
+static void add_share(const ascc_pair_reverse *q, int part, size_t i, const bumps_at *at, double g)
+{
+    float *share = ((const gradients *)q->data)->part[part];
+    for (size_t k = 0; share && k < at->count; k++)
+        share[i * ASCC_MAX_BUMPS + at->first + k] += (float)(at->value[k] * g);
+}
+
+/* One pair and what its impulse along u is made of: cosine * strength - damping * approach. */
+typedef struct pair {
+    size_t i, j;
+    bool both;               /* j is fluid, too */
+    double distance, length; /* of r, seen, and of d, along which the pair acts */
+    double seen[3], u[3];    /* unit vectors of r and d */
+    double cosine, strength, damping, approach;
+    double slope, damping_slope;  /* of strength and damping by distance over radius */
+    double force[3], relative[3]; /* gradient of the impulse; motion of i less that of j */
+    double along;                 /* force . u */
+    double total;                 /* the impulse along u, limited */
+    bool limited;                 /* then nothing but u changes it */
+} pair;
+
+/* Gradients by r (seen) and d (the line), added to the positions'. */
+static void pass_places(const ascc_pair_reverse *q, const pair *a, const ascc_filter *filter)
+{
+    const ascc_reverse *p = q->pass;
+    const ascc_hierarchy *h = p->run->hierarchy;
+    const size_t n = (size_t)p->run->plan->dimension;
+    const bool before = q->place && a->both; /* walls push along the line that the network sees */
+    const double by_cosine = a->along * a->strength;
+    const double by_rho =
+        a->along * (a->cosine * a->slope - a->damping_slope * a->approach) / filter->radius;
+    double by_u[3], by_seen[3], seen_i[3], seen_j[3], turned = 0.0, seen_turned = 0.0;
+    for (size_t c = 0; c < 3; c++) {
+        by_u[c] = a->force[c] * a->total - a->damping * a->along * a->relative[c] +
+                  (before ? by_cosine * a->seen[c] : 0.0);
+        by_seen[c] = before ? by_cosine * a->u[c] : 0.0;
+        turned += by_u[c] * a->u[c];
+        seen_turned += by_seen[c] * a->seen[c];
+    }
+    for (size_t c = 0; c < 3; c++) {
+        const double by_d = (by_u[c] - turned * a->u[c]) / a->length;
+        seen_j[c] = by_rho * a->seen[c] + (before ? 0.0 : by_d);
+        if (a->distance > 0.0)
+            seen_j[c] += (by_seen[c] - seen_turned * a->seen[c]) / a->distance;
+        seen_i[c] = -seen_j[c];
+        if (before && c < n) {
+            p->pass->place[ascc_hierarchy_host_row(h, q->set, a->i) * n + c] -= by_d;
+            p->pass->place[ascc_hierarchy_host_row(h, q->set, a->j) * n + c] += by_d;
+        }
+    }
+    ascc_reverse_place(p, q->set, a->i, seen_i);
+    if (a->both)
+        ascc_reverse_place(p, q->set, a->j, seen_j);
+}
+
+static void find_pair(const ascc_pair_reverse *q, int part, const bumps_at *at, const double r[3],
+                      const double d[3], pair *a)
+{
+    const ascc_reverse *p = q->pass;
+    const ascc_plan *plan = p->run->plan;
+    for (size_t c = 0; c < 3; c++) {
+        a->u[c] = d[c] / a->length;
+        a->seen[c] = a->distance > 0.0 ? r[c] / a->distance : 0.0;
+        a->force[c] = q->force[a->i * 3 + c] - (a->both ? q->force[a->j * 3 + c] : 0.0);
+        a->relative[c] = 0.0;
+    }
+    a->cosine = q->place && a->both ? ascc_dot3(a->seen, a->u) : 1.0;
+    a->strength = strength_of(q, part, a->i, a->j, a->both, at, &a->slope);
+    a->damping = strength_of(q, part + 1, a->i, a->j, a->both, at, &a->damping_slope);
+    a->along = ascc_dot3(a->force, a->u);
+    a->approach = 0.0;
+    if (((const gradients *)q->data)->c.part[part + 1]) {
+        const size_t width = ascc_padded(plan->fluid_channels);
+        const float *motion = p->run->value[0].raw + ascc_plan_motion(plan, 0);
+        for (int32_t c = 0; c < plan->dimension; c++)
+            a->relative[c] = (double)motion[a->i * width + (size_t)c] -
+                             (a->both ? (double)motion[a->j * width + (size_t)c] : 0.0);
+        a->approach = ascc_dot3(a->relative, a->u);
+    }
+    const double limit = ascc_output_limit(&plan->output);
+    a->total = a->cosine * a->strength - a->damping * a->approach;
+    a->limited = fabs(a->total) > limit;
+    if (a->limited) {
+        a->total = a->total > 0.0 ? limit : -limit;
+        a->strength = a->slope = a->damping = a->damping_slope = 0.0;
+    }
+}
+
+/* One pair: line d from i to j, displacement r seen; parts `part` (strength) and part + 1 (damping). */
+static void pass_pair(const ascc_pair_reverse *q, int part, const ascc_filter *filter, size_t i,
+                      size_t j, bool both, const double r[3], const double d[3])
+{
+    const ascc_reverse *p = q->pass;
+    const ascc_plan *plan = p->run->plan;
+    pair a = {.i = i,
+              .j = j,
+              .both = both,
+              .distance = sqrt(ascc_dot3(r, r)),
+              .length = sqrt(ascc_dot3(d, d))};
+    if (a.length == 0.0)
+        return;
+    const bumps_at at = find_bumps(a.distance / filter->radius, filter->bumps);
+    find_pair(q, part, &at, r, d, &a);
+    for (int side = 0; side < (both ? 2 : 1) && !a.limited; side++) {
+        add_share(q, part, side ? j : i, &at, a.cosine * a.along);
+        add_share(q, part + 1, side ? j : i, &at, -a.approach * a.along);
+    }
+    if (((const gradients *)q->data)->c.part[part + 1] && p->value[0].raw) {
+        const size_t width = ascc_padded(plan->fluid_channels);
+        float *motion = p->value[0].raw + ascc_plan_motion(plan, 0);
+        for (int32_t c = 0; c < plan->dimension; c++) {
+            const float g = (float)(-a.damping * a.along * a.u[c]);
+            motion[i * width + (size_t)c] += g;
+            if (both)
+                motion[j * width + (size_t)c] -= g;
+        }
+    }
+    if (p->pass->seen)
+        pass_places(q, &a, filter);
+}
+
+static void visit(const ascc_pair_reverse *q, size_t i, size_t j, const double r[3],
+                  const double d[3])
+{
+    pass_pair(q, ASCC_TENSOR_STRENGTH, &q->pass->run->plan->output.term.filter, i, j, true, r, d);
+}
+
+static void visit_walls(const ascc_pair_reverse *q)
+{
+    const ascc_network_run *run = q->pass->run;
+    const ascc_rows *rows = ascc_term_list(run, &run->plan->output.term, 1);
+    for (size_t i = 0; i < rows->query->count; i++)
+        for (size_t k = rows->start[i]; k < rows->start[i] + rows->count[i]; k++) {
+            double r[3];
+            ascc_seen_displacement(run, rows, i, rows->neighbor[k], r);
+            pass_pair(q, ASCC_TENSOR_WALL, &run->plan->output.walls, i, rows->neighbor[k], false, r,
+                      r);
+        }
+}
+
+static bool take_gradients(gradients *g, const ascc_reverse *pass, size_t count)
+{
+    for (int part = 0; part < PARTS; part++) {
+        if (!pass->run->plan->output.term.tensor[part])
+            continue;
+        g->part[part] = ascc_arena_take(pass->pass->arena, count, ASCC_MAX_BUMPS * sizeof(float));
+        if (!g->part[part])
+            return false;
+        memset(g->part[part], 0, count * ASCC_MAX_BUMPS * sizeof(float));
+    }
+    return true;
+}
+
+/* From the coefficients to the source's rows and the parts' weights. */
+static void pass_coefficients(const ascc_pair_reverse *q, const gradients *g)
+{
+    const ascc_reverse *pass = q->pass;
+    const ascc_term *term = &pass->run->plan->output.term;
+    const size_t count = pass->run->hierarchy->set[q->set].count, a = ascc_padded(term->inputs);
+    const uint8_t *active = pass->run->value[term->source].active;
+    for (int part = 0; part < PARTS; part++) {
+        const float *from = g->part[part];
+        if (!from)
+            continue;
+        const size_t offset = (size_t)part * part_size(term);
+        if (q->value_gradient)
+            pass->run->tools->kernels->multiply(from, ASCC_MAX_BUMPS, count, ASCC_MAX_BUMPS,
+                                                ascc_reverse_transposed(pass, term) + offset, a,
+                                                q->value_gradient, a);
+        float *to = ascc_reverse_packed(pass, term) + offset;
+        for (size_t i = 0; i < count; i++)
+            for (size_t c = 0; active[i] && c < a; c++)
+                for (size_t k = 0; k < ASCC_MAX_BUMPS; k++)
+                    to[c * ASCC_MAX_BUMPS + k] +=
+                        q->value[i * a + c] * from[i * ASCC_MAX_BUMPS + k];
+    }
+}
+
+static ascc_status backward(ascc_reverse *pass)
+{
+    gradients g = {.part = {NULL}};
+    ascc_pair_reverse pairs;
+    if (!ascc_pair_reverse_open(&pairs, pass) ||
+        !find_coefficients(&g.c, pass->run, pass->pass->arena, ascc_arena_take) ||
+        !take_gradients(&g, pass, pass->run->hierarchy->set[pairs.set].count))
+        return ASCC_ERROR_MEMORY;
+    pairs.data = &g;
+    ascc_pair_reverse_run(&pairs, visit);
+    if (pass->run->plan->output.has_walls)
+        visit_walls(&pairs);
+    pass_coefficients(&pairs, &g);
+    return ASCC_OK;
+}
+
+const ascc_operation ascc_op_pairs_basis = {.name = "pairs in a basis",
+                                            .type = "antisymmetric",
+                                            .with = "basis",
+                                            .not_negative = 1u << ASCC_TENSOR_DAMPING |
+                                                            1u << ASCC_TENSOR_WALL_DAMPING,
+                                            .read = read_pairs,
+                                            .check = check,
+                                            .lists = lists,
+                                            .packed_size = packed_size,
+                                            .pack = pack,
+                                            .unpack = unpack,
+                                            .transpose = transpose,
+                                            .cost = cost,
+                                            .scratch = scratch,
+                                            .reads_features = is_damped,
+                                            .impulses = impulses,
+                                            .backward_output = backward};

@@ -1,0 +1,71 @@
+/* New momenta and positions from the impulses: symplectic Euler in integers (docs/method.md, section 1).
+ * SPDX-License-Identifier: MIT */
+#include <inttypes.h>
+#include <math.h>
+
+#include "stage.h"
+
+typedef struct advance_job {
+    const ascc_particles *p;
+    const ascc_motion *motion;
+    const int64_t *impulse;
+    ascc_advance *advance;
+    atomic_size_t bad; /* 1 + first row that fails */
+} advance_job;
+
+static ascc_status advance_row(const advance_job *job, size_t i, ascc_message *message)
+{
+    const ascc_particles *p = job->p;
+    const ascc_motion *motion = job->motion;
+    ascc_advance *advance = job->advance;
+    const size_t d = (size_t)p->dimension;
+    const double dt = motion->time_step;
+    double moved = 0.0;
+    for (size_t c = 0; c < d; c++) {
+        const size_t k = i * d + c;
+        int64_t sum;
+        if (__builtin_add_overflow(p->momentum[k] + advance->external[k], job->impulse[k], &sum) ||
+            sum > ASCC_MOMENTUM_LIMIT || sum < -ASCC_MOMENTUM_LIMIT)
+            return ascc_fail(message, ASCC_ERROR_RANGE,
+                             "fluid particle %" PRIu64 " (row %zu): momentum too large to hold",
+                             p->id[i], i);
+        const double step = dt * ((double)sum * p->quantum / p->mass[i]);
+        advance->momentum[k] = sum;
+        advance->position[k] = p->position[k] + step;
+        moved += step * step;
+        if (!(fabs(advance->position[k]) <= ASCC_POSITION_LIMIT * p->spacing))
+            return ascc_fail(message, ASCC_ERROR_RANGE,
+                             "fluid particle %" PRIu64 " (row %zu): position out of range",
+                             p->id[i], i);
+    }
+    if (motion->max_displacement > 0.0 &&
+        moved > motion->max_displacement * motion->max_displacement)
+        return ascc_fail(message, ASCC_ERROR_RANGE,
+                         "fluid particle %" PRIu64
+                         " (row %zu) would move %g, more than max_displacement = %g",
+                         p->id[i], i, sqrt(moved), motion->max_displacement);
+    return ASCC_OK;
+}
+
+static void advance_rows(void *data, size_t begin, size_t end, int32_t slot)
+{
+    (void)slot;
+    advance_job *job = data;
+    ascc_message message;
+    for (size_t i = begin; i < end; i++)
+        if (advance_row(job, i, &message) != ASCC_OK) {
+            ascc_note_first(&job->bad, i);
+            return;
+        }
+}
+
+ascc_status ascc_stage_advance(ascc_step_state *state)
+{
+    advance_job job = {.p = state->particles,
+                       .motion = state->motion,
+                       .impulse = state->impulses.fluid,
+                       .advance = &state->advance};
+    ascc_workers_run(state->tools.workers, job.p->fluid_count, 1024, advance_rows, &job);
+    const size_t bad = atomic_load(&job.bad); /* says once more why */
+    return bad ? advance_row(&job, bad - 1, state->tools.message) : ASCC_OK;
+}

@@ -1,0 +1,93 @@
+/* The new state becomes the particles' own: nothing here can fail, once the sums over the run have been
+ * found to fit. SPDX-License-Identifier: MIT */
+#include "commit.h"
+
+#include <string.h>
+
+/* Sums for the statistics: they wrap instead of failing. */
+typedef struct totals_job {
+    const int64_t *rows;
+    size_t dimension;
+    atomic_uint_least64_t sum[3];
+} totals_job;
+
+static void add_rows(void *data, size_t begin, size_t end, int32_t slot)
+{
+    (void)slot;
+    totals_job *job = data;
+    const size_t d = job->dimension;
+    uint64_t sum[3] = {0, 0, 0};
+    for (size_t i = begin; i < end; i++)
+        for (size_t c = 0; c < d; c++)
+            sum[c] += (uint64_t)job->rows[i * d + c];
+    for (size_t c = 0; c < d; c++)
+        atomic_fetch_add_explicit(&job->sum[c], sum[c], memory_order_relaxed);
+}
+
+void ascc_totals(ascc_workers *workers, int64_t total[3], const int64_t *rows, size_t count,
+                 size_t dimension)
+{
+    totals_job job = {.rows = rows, .dimension = dimension};
+    ascc_workers_run(workers, count, 8192, add_rows, &job);
+    for (size_t c = 0; c < 3; c++)
+        total[c] = (int64_t)atomic_load(&job.sum[c]);
+}
+
+static void add_totals(ascc_workers *workers, int64_t total[3], const int64_t *rows, size_t count,
+                       size_t dimension)
+{
+    int64_t one[3];
+    ascc_totals(workers, one, rows, count, dimension);
+    for (size_t c = 0; c < 3; c++)
+        total[c] = (int64_t)((uint64_t)total[c] + (uint64_t)one[c]);
+}
+
+/* Impulses of walls become those since the run began. */
+static ascc_status sum_walls(ascc_step_state *state)
+{
+    const ascc_particles *p = state->particles;
+    const size_t d = (size_t)p->dimension;
+    int64_t *wall = state->impulses.wall;
+    for (size_t k = 0; k < p->boundary_count * d; k++)
+        if (__builtin_add_overflow(wall[k], p->wall_impulse[k], &wall[k]))
+            return ascc_fail(state->tools.message, ASCC_ERROR_RANGE,
+                             "boundary row %zu: its impulse over the run is too large to hold",
+                             k / d);
+    return ASCC_OK;
+}
+
+typedef struct commit_job {
+    ascc_particles *particles;
+    const ascc_advance *advance;
+} commit_job;
+
+static void commit_rows(void *data, size_t begin, size_t end, int32_t slot)
+{
+    (void)slot;
+    const commit_job *job = data;
+    const size_t d = (size_t)job->particles->dimension, n = (end - begin) * d;
+    memcpy(job->particles->position + begin * d, job->advance->position + begin * d,
+           n * sizeof(double));
+    memcpy(job->particles->momentum + begin * d, job->advance->momentum + begin * d,
+           n * sizeof(int64_t));
+}
+
+ascc_status ascc_stage_commit(ascc_step_state *state, ascc_particles *p, bool first)
+{
+    ascc_workers *workers = state->tools.workers;
+    ascc_step_statistics *s = state->statistics;
+    const size_t d = (size_t)p->dimension, n = p->fluid_count, walls = p->boundary_count;
+    if (first)
+        ascc_totals(workers, s->momentum_before, p->momentum, n, d);
+    add_totals(workers, s->external_impulse, state->advance.external, n, d);
+    add_totals(workers, s->wall_impulse, state->impulses.wall, walls, d);
+    ascc_totals(workers, s->momentum_after, state->advance.momentum, n, d);
+    const ascc_status status = first ? ASCC_OK : sum_walls(state);
+    if (status != ASCC_OK)
+        return status;
+    commit_job job = {p, &state->advance};
+    ascc_workers_run(workers, n, 8192, commit_rows, &job);
+    if (walls)
+        memcpy(p->wall_impulse, state->impulses.wall, walls * d * sizeof(int64_t));
+    return ASCC_OK;
+}

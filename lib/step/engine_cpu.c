@@ -1,0 +1,51 @@
+/* The engine of this machine's CPU: point sets, neighbour lists, layers, pair impulses.
+ * SPDX-License-Identifier: MIT */
+#include "engine.h"
+
+/* Quanta per kilogram and unit of the network's output: the output is a displacement during the
+ * model's time step; with another one, the velocity it stands for is scaled as an acceleration. */
+static ascc_impulse_scale impulse_scale(const ascc_step_state *state)
+{
+    const ascc_plan *plan = state->network->plan;
+    const ascc_particles *p = state->particles;
+    ascc_impulse_scale scale = {.mass = p->mass, .position = p->position};
+    for (int c = 0; c < 3; c++)
+        scale.factor[c] = plan->output.scale[c] / plan->time_step *
+                          (state->motion->time_step / plan->time_step) / state->length_unit /
+                          p->quantum;
+    return scale;
+}
+
+static void tell(ascc_step_state *state)
+{
+    const ascc_hierarchy *h = &state->hierarchy;
+    ascc_step_statistics *s = state->statistics;
+    s->neighbor_count = state->run.neighbor_count;
+    s->max_neighbors = state->run.longest;
+    s->level_points[0] = h->set[ASCC_SET_ALL].count;
+    for (int32_t l = 1; l < state->network->plan->level_count; l++)
+        s->level_points[l] = h->set[ASCC_SET_LEVEL + l - 1].count;
+}
+
+ascc_status ascc_engine_cpu(ascc_step_state *state)
+{
+    ascc_status status = ascc_stage_sight(state);
+    ascc_stage_lap(state, "sight");
+    if (status == ASCC_OK)
+        status = ascc_network_demand(&state->run, state->network, &state->hierarchy, &state->tools,
+                                     state->expected);
+    ascc_stage_lap(state, "search");
+    if (status == ASCC_OK)
+        status = ascc_network_forward(&state->run, state->fluid_features, state->boundary_features);
+    ascc_arena_return(state->tools.arena, state->before_features);
+    ascc_stage_lap(state, "network");
+    if (status == ASCC_OK) {
+        const ascc_impulse_scale scale = impulse_scale(state);
+        status = state->network->plan->output.term.operation->impulses(
+            &state->run, &scale, &state->impulses, &state->statistics->pair_count);
+    }
+    ascc_stage_lap(state, "pairs");
+    if (status == ASCC_OK)
+        tell(state);
+    return status;
+}

@@ -1,0 +1,90 @@
+/* What the network sees: features of all particles, and the point sets of the scene.
+ * SPDX-License-Identifier: MIT */
+#include "stage.h"
+
+/* vector: m/s of fluid, a normal of boundary, in units of `factor`; motion: the factor that makes of it
+ * spacings a time step; gravity: in spacings a squared time step. */
+static void features_of(const ascc_plan *plan, const int32_t *feature, int32_t feature_count,
+                        const double *vector, double factor, double motion, const double *gravity,
+                        float *to)
+{
+    for (int32_t f = 0; f < feature_count; f++) {
+        const double scale = feature[f] == ASCC_FEATURE_MOTION ? motion : factor;
+        if (feature[f] == ASCC_FEATURE_ONE)
+            *to++ = 1.0f;
+        else if (feature[f] == ASCC_FEATURE_GRAVITY)
+            for (int32_t c = 0; c < plan->dimension; c++)
+                *to++ = (float)gravity[c];
+        else
+            for (int32_t c = 0; c < plan->dimension; c++)
+                *to++ = (float)(vector[c] * scale);
+    }
+}
+
+/* Features of all particles in the host's order; vectors in metres. */
+static bool lend_features(ascc_step_state *state)
+{
+    const ascc_plan *plan = state->network->plan;
+    const ascc_particles *p = state->particles;
+    ascc_arena *arena = state->tools.arena;
+    const size_t d = (size_t)p->dimension;
+    const size_t fluid = (size_t)plan->fluid_channels, wall = (size_t)plan->boundary_channels;
+    state->fluid_features = ascc_arena_lend(arena, p->fluid_count, fluid * sizeof(float));
+    state->boundary_features = ascc_arena_lend(arena, p->boundary_count, wall * sizeof(float));
+    if (!state->fluid_features || !state->boundary_features)
+        return false;
+    const double unit = state->length_unit, motion = unit * plan->time_step / plan->spacing;
+    double gravity[3] = {0.0, 0.0, 0.0};
+    for (size_t c = 0; c < d; c++)
+        gravity[c] = state->motion->gravity[c] * plan->time_step * motion;
+    for (size_t i = 0; i < p->fluid_count; i++)
+        features_of(plan, plan->fluid_features, plan->fluid_feature_count,
+                    state->advance.velocity + i * d, unit, motion, gravity,
+                    state->fluid_features + i * fluid);
+    for (size_t i = 0; i < p->boundary_count; i++)
+        features_of(plan, plan->boundary_features, plan->boundary_feature_count,
+                    p->wall_normal + i * d, 1.0, 0.0, gravity, state->boundary_features + i * wall);
+    return true;
+}
+
+typedef struct scale_job {
+    const double *from;
+    double *to, unit;
+} scale_job;
+
+static void scale_part(void *data, size_t begin, size_t end, int32_t slot)
+{
+    (void)slot;
+    const scale_job *job = data;
+    for (size_t i = begin; i < end; i++)
+        job->to[i] = job->from[i] * job->unit;
+}
+
+/* Positions in metres. */
+static double *scaled(const ascc_search_tools *tools, const double *position, size_t count,
+                      double unit)
+{
+    scale_job job = {position, ascc_arena_lend(tools->arena, count, sizeof(double)), unit};
+    if (job.to)
+        ascc_workers_run(tools->workers, count, 16384, scale_part, &job);
+    return job.to;
+}
+
+ascc_status ascc_stage_sight(ascc_step_state *state)
+{
+    const ascc_search_tools *tools = &state->tools;
+    const ascc_particles *p = state->particles;
+    const size_t d = (size_t)p->dimension;
+    ascc_scene scene = {.fluid_count = p->fluid_count, .boundary_count = p->boundary_count};
+    state->before_features = ascc_arena_mark_of(tools->arena);
+    const bool room = lend_features(state);
+    const ascc_arena_mark before_scene = ascc_arena_mark_of(tools->arena);
+    scene.fluid = scaled(tools, state->advance.seen, p->fluid_count * d, state->length_unit);
+    scene.boundary = scaled(tools, p->wall_position, p->boundary_count * d, state->length_unit);
+    if (!room || !scene.fluid || !scene.boundary)
+        return ascc_fail(tools->message, ASCC_ERROR_MEMORY, "no memory for the features");
+    const ascc_status status =
+        ascc_hierarchy_build(&state->hierarchy, tools, state->network->plan, &scene);
+    ascc_arena_return(tools->arena, before_scene);
+    return status;
+}

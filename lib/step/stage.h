@@ -1,0 +1,68 @@
+/* A step as a list of stages over one state, and what they hand on.
+ * SPDX-License-Identifier: MIT
+ *
+ * Each stage is a file that exports one function; step.c lists them. Until the last one, commit, nothing
+ * has touched the particles, so a stage that fails leaves them as they were.
+ */
+#ifndef ASCC_STAGE_H
+#define ASCC_STAGE_H
+
+#include "network/pair_sum.h"
+#include "points/particles.h"
+
+/* What one step does from outside, in the host's units. */
+typedef struct ascc_motion {
+    double time_step;
+    double gravity[3];
+    const double *acceleration; /* [fluid][dimension] or NULL */
+    ascc_advection advection;
+    double max_displacement; /* 0 = none */
+} ascc_motion;
+
+/* One step's state while it is not yet the particles' own. All [fluid count][dimension]. */
+typedef struct ascc_advance {
+    double *seen;      /* where the network sees the fluid; its memory becomes position's */
+    double *position;  /* where it ends */
+    double *velocity;  /* after external forces: what the network sees */
+    int64_t *momentum; /* at the end */
+    int64_t *external; /* impulse of gravity and acceleration, quanta */
+} ascc_advance;
+
+/* All intermediate results of one step, in its arena: valid until that is reset. */
+typedef struct ascc_step_state {
+    /* What a step begins with: */
+    const ascc_network *network;
+    const ascc_particles *particles;
+    const ascc_motion *motion;
+    double length_unit;                                   /* m */
+    size_t *expected;                                     /* of the network's neighbour lists */
+    ascc_status (*engine)(struct ascc_step_state *state); /* engine.h */
+    ascc_search_tools tools;
+    ascc_step_statistics *statistics; /* also the times of stages */
+    double since;                     /* when the stage under way began, s */
+    /* What stages make: */
+    ascc_advance advance;
+    ascc_impulses impulses;
+    float *fluid_features, *boundary_features; /* lent until the network has run */
+    ascc_arena_mark before_features;
+    ascc_hierarchy hierarchy;
+    ascc_network_run run;
+} ascc_step_state;
+
+typedef ascc_status (*ascc_stage)(ascc_step_state *state);
+
+/* v* = v + dt g, and where the network sees the particles. errors: MEMORY, RANGE. */
+ascc_status ascc_stage_forces(ascc_step_state *state);
+/* Features, and the point sets of the scene (paper sections 3.3, 3.4). errors: MEMORY, RANGE. */
+ascc_status ascc_stage_sight(ascc_step_state *state);
+/* New momenta and positions. errors: RANGE, NOT_FINITE; the message names the particle. */
+ascc_status ascc_stage_advance(ascc_step_state *state);
+/* Walls that nothing passes. errors: RANGE. */
+ascc_status ascc_stage_contact(ascc_step_state *state);
+
+/* Monotonic seconds. */
+double ascc_clock(void);
+/* Adds the time since the last call to the stage of this name. */
+void ascc_stage_lap(ascc_step_state *state, const char *name);
+
+#endif
