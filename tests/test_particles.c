@@ -1556,6 +1556,42 @@ static void the_hash_is_the_same_everywhere(void **state)
     assert_true(ascc_particles_hash(self->set) == UINT64_C(0x08e4fd2a444bebb7));
 }
 
+/* ---- Golden ---------------------------------------------------------------------------------- */
+
+/* FNV-1a. */
+static uint64_t fingerprint(const unsigned char *bytes, size_t size)
+{
+    uint64_t sum = UINT64_C(0xcbf29ce484222325);
+    for (size_t i = 0; i < size; i++)
+        sum = (sum ^ bytes[i]) * UINT64_C(0x100000001b3);
+    return sum;
+}
+
+/* Taken when every array was still written by hand: snapshots of that time must be read for ever. */
+static void assert_golden(fixture *self, uint64_t snapshot, uint64_t hash)
+{
+    add_scene(self->set, 36, 37, 23);
+    const uint64_t gone[] = {5, 40, 1, 37};
+    assert_int_equal(ascc_particles_remove(self->set, 4, gone), ASCC_OK);
+    assert_int_equal(ascc_particles_resize_fluid(self->set, 35), ASCC_OK);
+    const picture taken = take_picture(self->set);
+    if (fingerprint(taken.bytes, taken.size) != snapshot)
+        fail_msg("snapshot %llx", (unsigned long long)fingerprint(taken.bytes, taken.size));
+    if (ascc_particles_hash(self->set) != hash)
+        fail_msg("hash %llx", (unsigned long long)ascc_particles_hash(self->set));
+    free(taken.bytes);
+}
+
+static void snapshot_and_hash_in_2d_are_those_of_version_1(void **state)
+{
+    assert_golden(*state, UINT64_C(0x3158528c3905c96b), UINT64_C(0x2dd5e149cdd307d8));
+}
+
+static void snapshot_and_hash_in_3d_are_those_of_version_1(void **state)
+{
+    assert_golden(*state, UINT64_C(0x4e3755e5c883bd07), UINT64_C(0x54441510d7e777c3));
+}
+
 /* ---- Messages -------------------------------------------------------------------------------- */
 
 static void a_reading_that_fails_leaves_its_message(void **state)
@@ -1623,6 +1659,8 @@ int main(void)
         IN_3D(zero_has_no_sign_for_the_hash),
         IN_2D(equal_particles_do_not_cancel_in_the_hash),
         IN_2D(the_hash_is_the_same_everywhere),
+        IN_2D(snapshot_and_hash_in_2d_are_those_of_version_1),
+        IN_3D(snapshot_and_hash_in_3d_are_those_of_version_1),
         IN_2D(a_reading_that_fails_leaves_its_message),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
