@@ -1223,6 +1223,55 @@ static void torque_in_the_plane_is_its_third_component(void **state)
     assert_true(torque[2] == -8 * ascc_particles_momentum_quantum(self->set));
 }
 
+/* ---- Measures -------------------------------------------------------------------------------- */
+
+static void a_failed_measure_leaves_its_output_untouched(void **state)
+{
+    fixture *const self = *state;
+    add_scene(self->set, 40, 20, 0);
+    ascc_measures before, measures;
+    memset(&before, 0x5a, sizeof before);
+    before.size = sizeof before;
+    bool failed = true;
+    size_t failures = 0;
+    while (failed) {
+        measures = before;
+        self->memory.fail_at = self->memory.calls + failures + 1;
+        const ascc_status status = ascc_particles_measure(self->set, &measures);
+        failed = status != ASCC_OK;
+        failures += failed;
+        if (failed) {
+            assert_refused(self, status, ASCC_ERROR_MEMORY, "memory");
+            assert_memory_equal(&measures, &before, sizeof before);
+        }
+    }
+    self->memory.fail_at = 0;
+    assert_true(failures > 2);
+    assert_true(measures.size == sizeof measures && measures.mass > 0);
+
+    measures = before;
+    self->set->position[5] = 1e300;
+    assert_refused(self, ascc_particles_measure(self->set, &measures), ASCC_ERROR_RANGE,
+                   "fluid row 2");
+    assert_memory_equal(&measures, &before, sizeof before);
+}
+
+static void measures_of_no_known_size_are_refused(void **state)
+{
+    fixture *const self = *state;
+    ascc_measures measures = {.size = sizeof measures - 1};
+    assert_refused(self, ascc_particles_measure(self->set, &measures), ASCC_ERROR_ARGUMENT,
+                   "measures");
+    measures.size = SIZE_MAX;
+    assert_refused(self, ascc_particles_measure(self->set, &measures), ASCC_ERROR_ARGUMENT,
+                   "measures");
+    assert_refused(self, ascc_particles_measure(self->set, NULL), ASCC_ERROR_ARGUMENT, "measures");
+    assert_int_equal(ascc_particles_measure(NULL, &measures), ASCC_ERROR_ARGUMENT);
+    assert_int_equal(ascc_particles_measure((ascc_particles *)self->context, &measures),
+                     ASCC_ERROR_ARGUMENT);
+    assert_true(measures.mass == 0 && measures.size == SIZE_MAX);
+}
+
 /* ---- Snapshot -------------------------------------------------------------------------------- */
 
 static void a_restored_set_is_what_it_was(void **state)
@@ -1774,6 +1823,8 @@ int main(void)
         cmocka_unit_test(every_failed_allocation_changes_and_leaks_nothing),
         IN_3D(body_impulse_and_torque_are_sums_over_the_rows_of_a_body),
         IN_2D(torque_in_the_plane_is_its_third_component),
+        IN_2D(a_failed_measure_leaves_its_output_untouched),
+        IN_3D(measures_of_no_known_size_are_refused),
         IN_3D(a_restored_set_is_what_it_was),
         IN_2D(an_empty_set_has_a_snapshot),
         IN_3D(a_snapshot_needs_its_size),

@@ -396,7 +396,10 @@ typedef struct ascc_measures {
     uint64_t close_count; /* fluid particles with another nearer than half a spacing */
 } ascc_measures;
 
-/** Measures the set (METHOD section 9). errors: ARGUMENT, MEMORY, RANGE. cost: one neighbour search. */
+/**
+ * Measures the set (METHOD section 9). errors: ARGUMENT, MEMORY, RANGE; on error measures are
+ * untouched. cost: one neighbour search. threads: one at a time, since it leaves its message in the set.
+ */
 ASCC_API ascc_status ascc_particles_measure(ascc_particles *particles, ascc_measures *measures);
 
 /* ---- Step: a model bound to the scratch memory it needs to advance particles ------------------ */
