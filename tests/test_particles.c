@@ -113,15 +113,21 @@ static void assert_refused(fixture *self, ascc_status status, ascc_status expect
         fail_msg("'%s' does not name '%s'", ascc_particles_message(self->set), part);
 }
 
+/* The context's line names what is wrong. */
+static void assert_context_names(fixture *self, const char *part)
+{
+    char text[ASCC_MESSAGE_CAPACITY];
+    ascc_context_message(self->context, text, sizeof text);
+    if (strstr(text, part) == NULL)
+        fail_msg("'%s' does not name '%s'", text, part);
+}
+
 /* A reader failed as it should: its line is the context's, and the set's is as before. */
 static void assert_reader_refused(fixture *self, ascc_status status, ascc_status expected,
                                   const char *part)
 {
-    char text[ASCC_MESSAGE_CAPACITY];
     assert_int_equal(status, expected);
-    ascc_context_message(self->context, text, sizeof text);
-    if (strstr(text, part) == NULL)
-        fail_msg("'%s' does not name '%s'", text, part);
+    assert_context_names(self, part);
 }
 
 /* Adds some fluid and two bodies with momenta, masses and wall impulses all over. */
@@ -180,8 +186,8 @@ static void options_out_of_range_are_refused(void **state)
 {
     fixture *const self = *state;
     const ascc_particles_options good = {.size = sizeof good, .dimension = 3, .spacing = 0.1};
-    ascc_particles_options bad[16];
-    const char *names[16];
+    ascc_particles_options bad[18];
+    const char *names[18];
     size_t count = 0;
 #define BAD(member, value, name)                                                                   \
     do {                                                                                           \
@@ -203,19 +209,18 @@ static void options_out_of_range_are_refused(void **state)
     BAD(momentum_quantum, -1, "momentum_quantum is -1");
     BAD(momentum_quantum, (double)INFINITY, "momentum_quantum is inf");
     BAD(mass, DBL_MIN, "momentum_quantum"); /* the default quantum would be too small */
+    BAD(spacing, 1e200, "spacing 1e+200 has no default mass: inf kg");
+    BAD(spacing, 1e-200, "spacing 1e-200 has no default mass: 0 kg");
     BAD(size, sizeof good - 1, "size");
     BAD(size, 0, "size");
 #undef BAD
     for (size_t i = 0; i < count; i++) {
         ascc_particles *set = self->set;
-        char text[ASCC_MESSAGE_CAPACITY];
         self->lines = 0;
         assert_int_equal(ascc_particles_create(self->context, &bad[i], &set), ASCC_ERROR_ARGUMENT);
         assert_null(set);
         assert_int_equal(self->lines, 1);
-        ascc_context_message(self->context, text, sizeof text);
-        if (strstr(text, names[i]) == NULL)
-            fail_msg("'%s' does not name '%s'", text, names[i]);
+        assert_context_names(self, names[i]);
     }
     ascc_particles *set;
     assert_int_equal(ascc_particles_create(self->context, NULL, &set), ASCC_ERROR_ARGUMENT);
@@ -267,6 +272,49 @@ static void the_default_quantum_is_2_to_the_minus_28_of_the_power_of_two_below(v
     assert_int_equal(ascc_particles_create(self->context, &given, &set), ASCC_OK);
     assert_true(ascc_particles_momentum_quantum(set) == 0.3);
     ascc_particles_destroy(&set);
+}
+
+static void a_product_that_has_no_default_quantum_is_refused_by_both_names(void **state)
+{
+    fixture *const self = *state;
+    static const struct {
+        double mass, spacing;
+        const char *message;
+    } cases[] = {
+        {1e308, 100, "mass 1e+308 times spacing 100 has no default momentum_quantum"},
+        {1e-300, 1e-20, "mass 1e-300 times spacing 1e-20 has"}, /* not even a product */
+        {1e-300, 1e-3, "mass 1e-300 times spacing 0.001 has"},  /* a product, no quantum */
+    };
+    for (size_t i = 0; i < COUNT_OF(cases); i++) {
+        ascc_particles_options options = {.size = sizeof options,
+                                          .dimension = 2,
+                                          .spacing = cases[i].spacing,
+                                          .mass = cases[i].mass};
+        ascc_particles *set;
+        assert_int_equal(ascc_particles_create(self->context, &options, &set), ASCC_ERROR_ARGUMENT);
+        assert_context_names(self, cases[i].message);
+        options.momentum_quantum = 1;
+        assert_int_equal(ascc_particles_create(self->context, &options, &set), ASCC_OK);
+        ascc_particles_destroy(&set);
+    }
+}
+
+static void the_default_mass_is_that_of_water(void **state)
+{
+    fixture *const self = *state;
+    for (int32_t dimension = 2; dimension <= 3; dimension++) {
+        const ascc_particles_options options = {
+            .size = sizeof options, .dimension = dimension, .spacing = 0.5};
+        ascc_particles *set;
+        double mass;
+        const ascc_array out = into_doubles(&mass);
+        assert_int_equal(ascc_particles_create(self->context, &options, &set), ASCC_OK);
+        assert_int_equal(ascc_particles_resize_fluid(set, 1), ASCC_OK);
+        assert_int_equal(ascc_particles_get(set, ASCC_FLUID, ASCC_MASS, 0, 1, &out), ASCC_OK);
+        assert_true(mass == (dimension == 2 ? 250 : 125));
+        assert_true(ascc_particles_momentum_quantum(set) == (dimension == 2 ? 0x1p-22 : 0x1p-23));
+        ascc_particles_destroy(&set);
+    }
 }
 
 static void handles_that_are_no_sets_are_refused(void **state)
@@ -1792,6 +1840,8 @@ int main(void)
         IN_3D(options_out_of_range_are_refused),
         IN_3D(longer_options_are_read_if_their_tail_is_zero),
         IN_2D(the_default_quantum_is_2_to_the_minus_28_of_the_power_of_two_below),
+        IN_2D(a_product_that_has_no_default_quantum_is_refused_by_both_names),
+        IN_2D(the_default_mass_is_that_of_water),
         IN_3D(handles_that_are_no_sets_are_refused),
         IN_3D(what_is_added_is_read_again),
         IN_2D(without_velocity_and_mass_fluid_rests_with_the_sets_mass),

@@ -219,7 +219,10 @@ typedef struct ascc_particles_options {
     int32_t dimension; /* 2 or 3 */
     int32_t reserved;  /* 0, else ARGUMENT */
     double spacing;    /* particle spacing, length unit: what the set's model was trained with */
-    double mass;       /* kg, of a particle added without one; 0 = 1 */
+    /* kg, of a particle added without one; 0 = water in SI units: 1000 kg/m^3 times
+     * spacing^dimension, in 2D of a layer one metre deep. Where the length unit is another, or the
+     * fluid, give it: rest density times spacing^dimension, the spacing in metres. */
+    double mass;
     /* Momentum is held in whole multiples of this, kg length/s; 0 = 2^-28 of the power of two below
      * mass * spacing / s: fine enough for 1e-9 spacings/s, coarse enough for 1e10. */
     double momentum_quantum;
@@ -229,7 +232,8 @@ typedef struct ascc_particles_options {
 /**
  * Makes an empty particle set.
  *
- * errors    ARGUMENT (dimension, spacing, mass or quantum out of range; NULL), MEMORY.
+ * errors    ARGUMENT (dimension, spacing, mass or quantum out of range; mass times spacing too large
+ *           or too small for a default quantum; NULL), MEMORY.
  * threads   one thread at a time per particle set; reading is not changing.
  */
 ASCC_API ascc_status ascc_particles_create(ascc_context *context,

@@ -14,6 +14,9 @@ _Static_assert(sizeof(void *) != 8 || sizeof(ascc_array) == 32, "part of the ABI
 /* The default quantum is this power of two below mass * spacing. */
 #define QUANTUM_EXPONENT (-28)
 
+/* kg/m^3; in 2D of a layer one metre deep. */
+#define WATER_DENSITY 1000.0
+
 /* ---- Failures -------------------------------------------------------------------------------- */
 
 static void write_line(ascc_message *message, ascc_status status, const char *format,
@@ -54,9 +57,18 @@ const char *ascc_particles_message(const ascc_particles *particles)
 
 /* ---- Life ------------------------------------------------------------------------------------ */
 
+static double default_mass(int32_t dimension, double spacing)
+{
+    const double area = spacing * spacing;
+    return WATER_DENSITY * (dimension == 3 ? area * spacing : area);
+}
+
+/* 0 or infinite where mass * spacing leaves the range of numbers. */
 static double default_quantum(double mass, double spacing)
 {
     int exponent;
+    if (!isfinite(mass * spacing))
+        return (double)INFINITY;
     (void)frexp(mass * spacing, &exponent); /* mass * spacing = f * 2^exponent, f in [1/2, 1) */
     return ldexp(1, exponent - 1 + QUANTUM_EXPONENT);
 }
@@ -73,13 +85,22 @@ static ascc_status settle_options(ascc_particles_options *options, ascc_message 
     if (!ascc_is_spacing(options->spacing))
         return ascc_fail(message, ASCC_ERROR_ARGUMENT, "particles: spacing is %g",
                          ascc_readable(options->spacing));
-    if (options->mass == 0)
-        options->mass = 1;
+    const bool no_mass = options->mass == 0, no_quantum = options->momentum_quantum == 0;
+    if (no_mass)
+        options->mass = default_mass(options->dimension, options->spacing);
+    if (no_mass && !ascc_is_mass(options->mass))
+        return ascc_fail(message, ASCC_ERROR_ARGUMENT,
+                         "particles: spacing %g has no default mass: %g kg", options->spacing,
+                         options->mass);
     if (!ascc_is_mass(options->mass))
         return ascc_fail(message, ASCC_ERROR_ARGUMENT, "particles: mass is %g",
                          ascc_readable(options->mass));
-    if (options->momentum_quantum == 0)
+    if (no_quantum)
         options->momentum_quantum = default_quantum(options->mass, options->spacing);
+    if (no_quantum && !ascc_is_quantum(options->momentum_quantum))
+        return ascc_fail(message, ASCC_ERROR_ARGUMENT,
+                         "particles: mass %g times spacing %g has no default momentum_quantum",
+                         options->mass, options->spacing);
     if (!ascc_is_quantum(options->momentum_quantum))
         return ascc_fail(message, ASCC_ERROR_ARGUMENT, "particles: momentum_quantum is %g",
                          ascc_readable(options->momentum_quantum));
