@@ -66,7 +66,15 @@ typedef struct ascc_context ascc_context;
 /** One piece of work for a host's job system: call it once for each index in [0, count). */
 typedef void (*ascc_task)(void *work, int32_t index);
 
-/** Options of ascc_context_create. */
+/**
+ * Options of ascc_context_create.
+ *
+ * The callbacks return to the library: no exception, longjmp or end of the thread may pass through
+ * it. What the call holds by then would leak, and its handle would be half changed. A C++ allocator
+ * that throws is wrapped: catch, return NULL, and the call fails with MEMORY. Callbacks may call the
+ * library with other handles; of the one that the call works on they may read the message alone. They
+ * are called on several threads at once where the host uses the context on several.
+ */
 typedef struct ascc_context_options {
     size_t size;          /* sizeof(ascc_context_options) */
     int32_t thread_count; /* threads a step may use at once, the caller's included; 0 = 1 */
