@@ -1,4 +1,4 @@
-/* Tests of lib/particles.c: what a set holds, refuses, forgets and remembers.
+/* Tests of particle sets: what a set holds, refuses, forgets and remembers.
  * SPDX-License-Identifier: MIT */
 #include "support/test.h"
 
@@ -8,6 +8,7 @@
 
 #include <float.h>
 #include <math.h>
+#include <pthread.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -112,6 +113,23 @@ static void assert_refused(fixture *self, ascc_status status, ascc_status expect
         fail_msg("'%s' does not name '%s'", ascc_particles_message(self->set), part);
 }
 
+/* The context's line names what is wrong. */
+static void assert_context_names(fixture *self, const char *part)
+{
+    char text[ASCC_MESSAGE_CAPACITY];
+    ascc_context_message(self->context, text, sizeof text);
+    if (strstr(text, part) == NULL)
+        fail_msg("'%s' does not name '%s'", text, part);
+}
+
+/* A reader failed as it should: its line is the context's, and the set's is as before. */
+static void assert_reader_refused(fixture *self, ascc_status status, ascc_status expected,
+                                  const char *part)
+{
+    assert_int_equal(status, expected);
+    assert_context_names(self, part);
+}
+
 /* Adds some fluid and two bodies with momenta, masses and wall impulses all over. */
 static void add_scene(ascc_particles *set, uint64_t seed, size_t fluid, size_t boundary)
 {
@@ -168,8 +186,8 @@ static void options_out_of_range_are_refused(void **state)
 {
     fixture *const self = *state;
     const ascc_particles_options good = {.size = sizeof good, .dimension = 3, .spacing = 0.1};
-    ascc_particles_options bad[16];
-    const char *names[16];
+    ascc_particles_options bad[18];
+    const char *names[18];
     size_t count = 0;
 #define BAD(member, value, name)                                                                   \
     do {                                                                                           \
@@ -191,19 +209,18 @@ static void options_out_of_range_are_refused(void **state)
     BAD(momentum_quantum, -1, "momentum_quantum is -1");
     BAD(momentum_quantum, (double)INFINITY, "momentum_quantum is inf");
     BAD(mass, DBL_MIN, "momentum_quantum"); /* the default quantum would be too small */
+    BAD(spacing, 1e200, "spacing 1e+200 has no default mass: inf kg");
+    BAD(spacing, 1e-200, "spacing 1e-200 has no default mass: 0 kg");
     BAD(size, sizeof good - 1, "size");
     BAD(size, 0, "size");
 #undef BAD
     for (size_t i = 0; i < count; i++) {
         ascc_particles *set = self->set;
-        char text[ASCC_MESSAGE_CAPACITY];
         self->lines = 0;
         assert_int_equal(ascc_particles_create(self->context, &bad[i], &set), ASCC_ERROR_ARGUMENT);
         assert_null(set);
         assert_int_equal(self->lines, 1);
-        ascc_context_message(self->context, text, sizeof text);
-        if (strstr(text, names[i]) == NULL)
-            fail_msg("'%s' does not name '%s'", text, names[i]);
+        assert_context_names(self, names[i]);
     }
     ascc_particles *set;
     assert_int_equal(ascc_particles_create(self->context, NULL, &set), ASCC_ERROR_ARGUMENT);
@@ -255,6 +272,49 @@ static void the_default_quantum_is_2_to_the_minus_28_of_the_power_of_two_below(v
     assert_int_equal(ascc_particles_create(self->context, &given, &set), ASCC_OK);
     assert_true(ascc_particles_momentum_quantum(set) == 0.3);
     ascc_particles_destroy(&set);
+}
+
+static void a_product_that_has_no_default_quantum_is_refused_by_both_names(void **state)
+{
+    fixture *const self = *state;
+    static const struct {
+        double mass, spacing;
+        const char *message;
+    } cases[] = {
+        {1e308, 100, "mass 1e+308 times spacing 100 has no default momentum_quantum"},
+        {1e-300, 1e-20, "mass 1e-300 times spacing 1e-20 has"}, /* not even a product */
+        {1e-300, 1e-3, "mass 1e-300 times spacing 0.001 has"},  /* a product, no quantum */
+    };
+    for (size_t i = 0; i < COUNT_OF(cases); i++) {
+        ascc_particles_options options = {.size = sizeof options,
+                                          .dimension = 2,
+                                          .spacing = cases[i].spacing,
+                                          .mass = cases[i].mass};
+        ascc_particles *set;
+        assert_int_equal(ascc_particles_create(self->context, &options, &set), ASCC_ERROR_ARGUMENT);
+        assert_context_names(self, cases[i].message);
+        options.momentum_quantum = 1;
+        assert_int_equal(ascc_particles_create(self->context, &options, &set), ASCC_OK);
+        ascc_particles_destroy(&set);
+    }
+}
+
+static void the_default_mass_is_that_of_water(void **state)
+{
+    fixture *const self = *state;
+    for (int32_t dimension = 2; dimension <= 3; dimension++) {
+        const ascc_particles_options options = {
+            .size = sizeof options, .dimension = dimension, .spacing = 0.5};
+        ascc_particles *set;
+        double mass;
+        const ascc_array out = into_doubles(&mass);
+        assert_int_equal(ascc_particles_create(self->context, &options, &set), ASCC_OK);
+        assert_int_equal(ascc_particles_resize_fluid(set, 1), ASCC_OK);
+        assert_int_equal(ascc_particles_get(set, ASCC_FLUID, ASCC_MASS, 0, 1, &out), ASCC_OK);
+        assert_true(mass == (dimension == 2 ? 250 : 125));
+        assert_true(ascc_particles_momentum_quantum(set) == (dimension == 2 ? 0x1p-22 : 0x1p-23));
+        ascc_particles_destroy(&set);
+    }
 }
 
 static void handles_that_are_no_sets_are_refused(void **state)
@@ -561,8 +621,8 @@ static void partial_sums_may_overflow_and_totals_may_not(void **state)
     }
     self->set->momentum[0] -= 1;
     int64_t total[3] = {7, 7, 7};
-    assert_refused(self, ascc_particles_total_momentum(self->set, total), ASCC_ERROR_RANGE,
-                   "total");
+    assert_reader_refused(self, ascc_particles_total_momentum(self->set, total), ASCC_ERROR_RANGE,
+                          "total");
     assert_true(total[0] == 7);
     for (int i = 4; i < 10; i++)
         self->set->momentum[2 * i + 1] = 0; /* 4 * -2^61 = INT64_MIN fits */
@@ -669,10 +729,12 @@ static void arrays_that_are_missing_or_unknown_are_refused(void **state)
     const double numbers[3] = {1, 0, 0};
     double out[3];
     const ascc_const_array good = doubles(numbers), missing = {0};
-    ascc_const_array odd = good, reserved = good;
+    ascc_const_array odd = good, reserved = good, later_absent = missing, broadcast = good;
     odd.scalar = (ascc_scalar)2;
-    reserved.reserved = 1;
-    const ascc_const_array *const bad[] = {&missing, &odd, &reserved};
+    reserved.reserved = later_absent.reserved = 1;
+    broadcast.component_stride = sizeof(double); /* a stride of 0 is no broadcast row */
+    const ascc_const_array *const bad[] = {NULL,      &missing,      &odd,
+                                           &reserved, &later_absent, &broadcast};
     const picture before = take_picture(self->set);
     for (size_t i = 0; i < COUNT_OF(bad); i++) {
         assert_refused(self, ascc_particles_add_fluid(self->set, 1, bad[i], NULL, NULL, NULL),
@@ -683,7 +745,7 @@ static void arrays_that_are_missing_or_unknown_are_refused(void **state)
                        ASCC_ERROR_ARGUMENT, "normal");
         assert_refused(self, ascc_particles_set(self->set, ASCC_FLUID, ASCC_POSITION, 0, 1, bad[i]),
                        ASCC_ERROR_ARGUMENT, "values");
-        if (i >= 2) {
+        if (i >= 2) { /* without them fluid rests, with the set's mass */
             assert_refused(self, ascc_particles_add_fluid(self->set, 1, &good, bad[i], NULL, NULL),
                            ASCC_ERROR_ARGUMENT, "velocity");
             assert_refused(self, ascc_particles_add_fluid(self->set, 1, &good, NULL, bad[i], NULL),
@@ -691,18 +753,19 @@ static void arrays_that_are_missing_or_unknown_are_refused(void **state)
         }
     }
     const ascc_array nowhere = {0}, unknown = {.data = out, .scalar = (ascc_scalar)-1},
-                     later = {.data = out, .reserved = 5};
-    const ascc_array *const bad_out[] = {&nowhere, &unknown, &later};
+                     later = {.data = out, .reserved = 5},
+                     overlaid = {.data = out, .component_stride = sizeof(float)};
+    const ascc_array *const bad_out[] = {NULL, &nowhere, &unknown, &later, &overlaid};
     for (size_t i = 0; i < COUNT_OF(bad_out); i++)
-        assert_refused(self,
-                       ascc_particles_get(self->set, ASCC_FLUID, ASCC_POSITION, 0, 1, bad_out[i]),
-                       ASCC_ERROR_ARGUMENT, "values");
-    assert_refused(self, ascc_particles_get_ids(self->set, ASCC_FLUID, 0, 1, NULL),
-                   ASCC_ERROR_ARGUMENT, "ids");
-    assert_refused(self, ascc_particles_get_bodies(self->set, 0, 1, NULL), ASCC_ERROR_ARGUMENT,
-                   "bodies");
-    assert_refused(self, ascc_particles_get_momentum(self->set, 0, 1, NULL), ASCC_ERROR_ARGUMENT,
-                   "momentum");
+        assert_reader_refused(
+            self, ascc_particles_get(self->set, ASCC_FLUID, ASCC_POSITION, 0, 1, bad_out[i]),
+            ASCC_ERROR_ARGUMENT, "values");
+    assert_reader_refused(self, ascc_particles_get_ids(self->set, ASCC_FLUID, 0, 1, NULL),
+                          ASCC_ERROR_ARGUMENT, "ids");
+    assert_reader_refused(self, ascc_particles_get_bodies(self->set, 0, 1, NULL),
+                          ASCC_ERROR_ARGUMENT, "bodies");
+    assert_reader_refused(self, ascc_particles_get_momentum(self->set, 0, 1, NULL),
+                          ASCC_ERROR_ARGUMENT, "momentum");
     assert_same_picture(self->set, before);
 }
 
@@ -737,8 +800,10 @@ static void rows_beyond_the_end_and_fields_a_kind_lacks_are_refused(void **state
     const picture before = take_picture(self->set);
     for (size_t i = 0; i < COUNT_OF(beyond); i++) {
         const size_t first = beyond[i].first, count = beyond[i].count;
+        assert_refused(self,
+                       ascc_particles_set(self->set, ASCC_FLUID, ASCC_POSITION, first, count, &in),
+                       ASCC_ERROR_ARGUMENT, "rows");
         const ascc_status refused[] = {
-            ascc_particles_set(self->set, ASCC_FLUID, ASCC_POSITION, first, count, &in),
             ascc_particles_get(self->set, ASCC_FLUID, ASCC_POSITION, first, count, &out),
             ascc_particles_get_ids(self->set, ASCC_FLUID, first, count, ids),
             ascc_particles_get_bodies(self->set, first, count, bodies),
@@ -746,7 +811,7 @@ static void rows_beyond_the_end_and_fields_a_kind_lacks_are_refused(void **state
             ascc_particles_get(self->set, ASCC_BOUNDARY, ASCC_NORMAL, first, count, &out),
         };
         for (size_t k = 0; k < COUNT_OF(refused); k++)
-            assert_refused(self, refused[k], ASCC_ERROR_ARGUMENT, "rows");
+            assert_reader_refused(self, refused[k], ASCC_ERROR_ARGUMENT, "rows");
     }
     static const struct {
         int kind, field;
@@ -760,13 +825,13 @@ static void rows_beyond_the_end_and_fields_a_kind_lacks_are_refused(void **state
         const char *const named = i < 5 ? "field" : "kind";
         assert_refused(self, ascc_particles_set(self->set, kind, field, 0, 1, &in),
                        ASCC_ERROR_ARGUMENT, named);
-        assert_refused(self, ascc_particles_get(self->set, kind, field, 0, 1, &out),
-                       ASCC_ERROR_ARGUMENT, named);
+        assert_reader_refused(self, ascc_particles_get(self->set, kind, field, 0, 1, &out),
+                              ASCC_ERROR_ARGUMENT, named);
     }
     assert_refused(self, ascc_particles_clear(self->set, (ascc_kind)2), ASCC_ERROR_ARGUMENT,
                    "kind");
-    assert_refused(self, ascc_particles_get_ids(self->set, (ascc_kind)2, 0, 0, ids),
-                   ASCC_ERROR_ARGUMENT, "kind");
+    assert_reader_refused(self, ascc_particles_get_ids(self->set, (ascc_kind)2, 0, 0, ids),
+                          ASCC_ERROR_ARGUMENT, "kind");
     assert_int_equal(ascc_particles_count(self->set, (ascc_kind)2), 0);
     assert_int_equal(ascc_particles_capacity(self->set, (ascc_kind)2), 0);
     assert_same_picture(self->set, before);
@@ -957,8 +1022,10 @@ static void an_id_that_is_gone_is_not_found(void **state)
     assert_true(kind == ASCC_FLUID && row == 1);
     assert_int_equal(ascc_particles_find(self->set, 6, NULL, NULL), ASCC_OK);
     assert_int_equal(ascc_particles_remove(self->set, 1, &gone), ASCC_OK);
-    assert_refused(self, ascc_particles_find(self->set, 2, &kind, &row), ASCC_ERROR_ARGUMENT, "2");
-    assert_refused(self, ascc_particles_find(self->set, 0, &kind, &row), ASCC_ERROR_ARGUMENT, "0");
+    assert_reader_refused(self, ascc_particles_find(self->set, 2, &kind, &row), ASCC_ERROR_ARGUMENT,
+                          "2");
+    assert_reader_refused(self, ascc_particles_find(self->set, 0, &kind, &row), ASCC_ERROR_ARGUMENT,
+                          "0");
     assert_true(kind == ASCC_FLUID && row == 1);
 }
 
@@ -1171,15 +1238,15 @@ static void body_impulse_and_torque_are_sums_over_the_rows_of_a_body(void **stat
                      ASCC_OK);
     assert_memory_equal(torque, about_origin, sizeof torque);
     const double nowhere[3] = {0, NAN, 0};
-    assert_refused(self, ascc_particles_body_impulse(self->set, 0, nowhere, impulse, torque),
-                   ASCC_ERROR_ARGUMENT, "point: component 1 is nan");
-    assert_refused(self, ascc_particles_body_impulse(self->set, -2, NULL, impulse, torque),
-                   ASCC_ERROR_ARGUMENT, "body: -2");
+    assert_reader_refused(self, ascc_particles_body_impulse(self->set, 0, nowhere, impulse, torque),
+                          ASCC_ERROR_ARGUMENT, "point: component 1 is nan");
+    assert_reader_refused(self, ascc_particles_body_impulse(self->set, -2, NULL, impulse, torque),
+                          ASCC_ERROR_ARGUMENT, "body: -2");
     for (size_t row = 0; row < 30; row++)
         self->set->wall_impulse[3 * row] = INT64_MAX;
     impulse[0] = 5;
-    assert_refused(self, ascc_particles_body_impulse(self->set, 0, NULL, impulse, torque),
-                   ASCC_ERROR_RANGE, "impulse");
+    assert_reader_refused(self, ascc_particles_body_impulse(self->set, 0, NULL, impulse, torque),
+                          ASCC_ERROR_RANGE, "impulse");
     assert_int_equal(impulse[0], 5);
     assert_int_equal(ascc_particles_body_impulse(self->set, 0, NULL, NULL, torque), ASCC_OK);
 }
@@ -1203,6 +1270,55 @@ static void torque_in_the_plane_is_its_third_component(void **state)
     const double ignored[3] = {1, 0, NAN};
     assert_int_equal(ascc_particles_body_impulse(self->set, 3, ignored, NULL, torque), ASCC_OK);
     assert_true(torque[2] == -8 * ascc_particles_momentum_quantum(self->set));
+}
+
+/* ---- Measures -------------------------------------------------------------------------------- */
+
+static void a_failed_measure_leaves_its_output_untouched(void **state)
+{
+    fixture *const self = *state;
+    add_scene(self->set, 40, 20, 0);
+    ascc_measures before, measures;
+    memset(&before, 0x5a, sizeof before);
+    before.size = sizeof before;
+    bool failed = true;
+    size_t failures = 0;
+    while (failed) {
+        measures = before;
+        self->memory.fail_at = self->memory.calls + failures + 1;
+        const ascc_status status = ascc_particles_measure(self->set, &measures);
+        failed = status != ASCC_OK;
+        failures += failed;
+        if (failed) {
+            assert_refused(self, status, ASCC_ERROR_MEMORY, "memory");
+            assert_memory_equal(&measures, &before, sizeof before);
+        }
+    }
+    self->memory.fail_at = 0;
+    assert_true(failures > 2);
+    assert_true(measures.size == sizeof measures && measures.mass > 0);
+
+    measures = before;
+    self->set->position[5] = 1e300;
+    assert_refused(self, ascc_particles_measure(self->set, &measures), ASCC_ERROR_RANGE,
+                   "fluid row 2");
+    assert_memory_equal(&measures, &before, sizeof before);
+}
+
+static void measures_of_no_known_size_are_refused(void **state)
+{
+    fixture *const self = *state;
+    ascc_measures measures = {.size = sizeof measures - 1};
+    assert_refused(self, ascc_particles_measure(self->set, &measures), ASCC_ERROR_ARGUMENT,
+                   "measures");
+    measures.size = SIZE_MAX;
+    assert_refused(self, ascc_particles_measure(self->set, &measures), ASCC_ERROR_ARGUMENT,
+                   "measures");
+    assert_refused(self, ascc_particles_measure(self->set, NULL), ASCC_ERROR_ARGUMENT, "measures");
+    assert_int_equal(ascc_particles_measure(NULL, &measures), ASCC_ERROR_ARGUMENT);
+    assert_int_equal(ascc_particles_measure((ascc_particles *)self->context, &measures),
+                     ASCC_ERROR_ARGUMENT);
+    assert_true(measures.mass == 0 && measures.size == SIZE_MAX);
 }
 
 /* ---- Snapshot -------------------------------------------------------------------------------- */
@@ -1260,10 +1376,10 @@ static void a_snapshot_needs_its_size(void **state)
     const size_t size = ascc_particles_snapshot_size(self->set);
     unsigned char *const bytes = malloc(size + 1);
     memset(bytes, 0x42, size + 1);
-    assert_refused(self, ascc_particles_snapshot(self->set, bytes, size - 1), ASCC_ERROR_ARGUMENT,
-                   "memory");
-    assert_refused(self, ascc_particles_snapshot(self->set, NULL, size), ASCC_ERROR_ARGUMENT,
-                   "memory");
+    assert_reader_refused(self, ascc_particles_snapshot(self->set, bytes, size - 1),
+                          ASCC_ERROR_ARGUMENT, "memory");
+    assert_reader_refused(self, ascc_particles_snapshot(self->set, NULL, size), ASCC_ERROR_ARGUMENT,
+                          "memory");
     assert_int_equal(bytes[0], 0x42);
     assert_int_equal(ascc_particles_snapshot(self->set, bytes, size + 1), ASCC_OK);
     assert_int_equal(bytes[size], 0x42);
@@ -1397,6 +1513,8 @@ static void impossible_snapshots_with_a_right_checksum_are_refused(void **state)
         {4, UINT64_C(1) << 61, ASCC_ERROR_FORMAT},
         {5, 0, ASCC_ERROR_FORMAT}, /* next id */
         {5, 4, ASCC_ERROR_FORMAT},
+        {5, UINT64_MAX, ASCC_ERROR_FORMAT}, /* beyond 2^63 */
+        {5, (UINT64_C(1) << 63) + 1, ASCC_ERROR_FORMAT},
         {6, 0, ASCC_ERROR_FORMAT}, /* spacing 0 */
         {6, UINT64_C(0x7ff8000000000000), ASCC_ERROR_FORMAT},
         {7, UINT64_C(0xbff0000000000000), ASCC_ERROR_FORMAT}, /* mass -1 */
@@ -1436,6 +1554,59 @@ static void impossible_snapshots_with_a_right_checksum_are_refused(void **state)
     }
     assert_same_picture(self->set, before);
     free(good.bytes);
+}
+
+static void a_refused_snapshot_is_told_its_field_and_row(void **state)
+{
+    fixture *const self = *state;
+    add_scene(self->set, 38, 2, 2); /* 2D, as above */
+    static const struct {
+        size_t word;
+        uint64_t value;
+        const char *message;
+    } cases[] = {
+        {5, UINT64_MAX, "memory: impossible ids; the next is 18446744073709551615"},
+        {12, UINT64_C(0x7ff0000000000000), "memory: position: row 1 component 1 is inf"},
+        {15, UINT64_C(1) << 62, "memory: momentum: row 1 component 0 is"},
+        {18, 0, "memory: mass: row 1 is 0, not a mass"},
+        {27, UINT64_C(0x4000000000000000), "memory: wall_normal: row 1 has length"},
+        {35, UINT64_C(1) << 32, "memory: wall_body: row 0 does not fit 32 bits"},
+        {36, UINT64_MAX, "memory: wall_body: row 1 is -1, negative"},
+    };
+    for (size_t i = 0; i < COUNT_OF(cases); i++) {
+        const picture taken = take_picture(self->set);
+        put_test_word(taken.bytes, cases[i].word, cases[i].value);
+        seal(taken.bytes, taken.size / 8);
+        assert_refused(self, ascc_particles_restore(self->set, taken.bytes, taken.size),
+                       ASCC_ERROR_FORMAT, cases[i].message);
+        free(taken.bytes);
+    }
+}
+
+static void ids_end_at_2_to_the_63_and_never_wrap(void **state)
+{
+    fixture *const self = *state;
+    add_scene(self->set, 39, 2, 2);
+    self->set->next_id = (UINT64_C(1) << 63) - 3;
+    const double one[8] = {1, 0, 1, 0, 1, 0, 1, 0};
+    const ascc_const_array in = doubles(one);
+    uint64_t ids[3] = {0};
+    const picture before = take_picture(self->set);
+    assert_refused(self, ascc_particles_add_fluid(self->set, 4, &in, NULL, NULL, ids),
+                   ASCC_ERROR_RANGE, "ids: the next is 9223372036854775805");
+    assert_refused(self, ascc_particles_add_boundary(self->set, 4, &in, &in, 0, ids),
+                   ASCC_ERROR_RANGE, "ids");
+    assert_refused(self, ascc_particles_resize_fluid(self->set, 6), ASCC_ERROR_RANGE, "ids");
+    assert_same_picture(self->set, before);
+    assert_int_equal(ids[0], 0);
+
+    assert_int_equal(ascc_particles_add_fluid(self->set, 3, &in, NULL, NULL, ids), ASCC_OK);
+    assert_true(ids[2] == INT64_MAX);
+    assert_refused(self, ascc_particles_resize_fluid(self->set, 6), ASCC_ERROR_RANGE, "ids");
+    assert_int_equal(ascc_particles_find(self->set, ids[1], NULL, NULL), ASCC_OK);
+    const picture full = take_picture(self->set); /* what it writes it takes */
+    assert_int_equal(ascc_particles_restore(self->set, full.bytes, full.size), ASCC_OK);
+    assert_same_picture(self->set, full);
 }
 
 static void a_snapshot_of_another_dimension_does_not_match(void **state)
@@ -1556,18 +1727,108 @@ static void the_hash_is_the_same_everywhere(void **state)
     assert_true(ascc_particles_hash(self->set) == UINT64_C(0x08e4fd2a444bebb7));
 }
 
+/* ---- Golden ---------------------------------------------------------------------------------- */
+
+/* FNV-1a. */
+static uint64_t fingerprint(const unsigned char *bytes, size_t size)
+{
+    uint64_t sum = UINT64_C(0xcbf29ce484222325);
+    for (size_t i = 0; i < size; i++)
+        sum = (sum ^ bytes[i]) * UINT64_C(0x100000001b3);
+    return sum;
+}
+
+/* Taken when every array was still written by hand: snapshots of that time must be read for ever. */
+static void assert_golden(fixture *self, uint64_t snapshot, uint64_t hash)
+{
+    add_scene(self->set, 36, 37, 23);
+    const uint64_t gone[] = {5, 40, 1, 37};
+    assert_int_equal(ascc_particles_remove(self->set, 4, gone), ASCC_OK);
+    assert_int_equal(ascc_particles_resize_fluid(self->set, 35), ASCC_OK);
+    const picture taken = take_picture(self->set);
+    if (fingerprint(taken.bytes, taken.size) != snapshot)
+        fail_msg("snapshot %llx", (unsigned long long)fingerprint(taken.bytes, taken.size));
+    if (ascc_particles_hash(self->set) != hash)
+        fail_msg("hash %llx", (unsigned long long)ascc_particles_hash(self->set));
+    free(taken.bytes);
+}
+
+static void snapshot_and_hash_in_2d_are_those_of_version_1(void **state)
+{
+    assert_golden(*state, UINT64_C(0x3158528c3905c96b), UINT64_C(0x2dd5e149cdd307d8));
+}
+
+static void snapshot_and_hash_in_3d_are_those_of_version_1(void **state)
+{
+    assert_golden(*state, UINT64_C(0x4e3755e5c883bd07), UINT64_C(0x54441510d7e777c3));
+}
+
 /* ---- Messages -------------------------------------------------------------------------------- */
 
-static void a_reading_that_fails_leaves_its_message(void **state)
+/* Every reader fails once. Returns how many did not. */
+static int fail_readers(const ascc_particles *set)
+{
+    double out[6];
+    uint64_t ids[2];
+    int32_t bodies[2];
+    int64_t quanta[6];
+    const ascc_array values = into_doubles(out);
+    int accepted = 0;
+    accepted += ascc_particles_get(set, ASCC_FLUID, ASCC_MASS, 1, 2, &values) == ASCC_OK;
+    accepted += ascc_particles_get_ids(set, ASCC_FLUID, 1, 2, ids) == ASCC_OK;
+    accepted += ascc_particles_get_bodies(set, 1, 2, bodies) == ASCC_OK;
+    accepted += ascc_particles_get_momentum(set, 1, 2, quanta) == ASCC_OK;
+    accepted += ascc_particles_total_momentum(set, NULL) == ASCC_OK;
+    accepted += ascc_particles_body_impulse(set, -2, NULL, quanta, NULL) == ASCC_OK;
+    accepted += ascc_particles_snapshot(set, out, sizeof out) == ASCC_OK;
+    accepted += ascc_particles_find(set, 1000, NULL, NULL) == ASCC_OK;
+    return accepted;
+}
+
+static void a_reading_that_fails_changes_no_bit_of_the_set(void **state)
 {
     fixture *const self = *state;
     add_scene(self->set, 35, 2, 0);
-    double out[2];
-    const ascc_array values = into_doubles(out);
+    assert_int_equal(ascc_particles_remove(self->set, 1, NULL), ASCC_ERROR_ARGUMENT);
+    assert_string_equal(ascc_particles_message(self->set), "ids: NULL");
+    struct ascc_particles before;
+    memcpy(&before, self->set, sizeof before);
     self->lines = 0;
-    assert_refused(self, ascc_particles_get(self->set, ASCC_FLUID, ASCC_MASS, 1, 2, &values),
-                   ASCC_ERROR_ARGUMENT, "fluid: rows [1, + 2) go beyond the 2 there are");
-    assert_int_equal(self->lines, 1);
+    assert_int_equal(fail_readers(self->set), 0);
+    assert_memory_equal(&before, self->set, sizeof before);
+    assert_string_equal(ascc_particles_message(self->set), "ids: NULL");
+    assert_int_equal(self->lines, 8);
+    assert_reader_refused(self, ascc_particles_get_ids(self->set, ASCC_FLUID, 1, 2, NULL),
+                          ASCC_ERROR_ARGUMENT, "fluid: rows [1, + 2) go beyond the 2 there are");
+}
+
+static void *read_in_vain(void *user)
+{
+    intptr_t accepted = 0;
+    for (int turn = 0; turn < 200; turn++)
+        accepted += fail_readers(user);
+    return (void *)accepted;
+}
+
+/* ThreadSanitizer sees a race of the two. */
+static void readers_that_fail_do_not_race(void **state)
+{
+    (void)state;
+    ascc_context *context;
+    ascc_particles *set;
+    const ascc_particles_options options = {.size = sizeof options, .dimension = 2, .spacing = 1};
+    assert_int_equal(ascc_context_create(NULL, &context), ASCC_OK);
+    assert_int_equal(ascc_particles_create(context, &options, &set), ASCC_OK);
+    add_scene(set, 37, 2, 2);
+    pthread_t thread;
+    void *accepted;
+    assert_int_equal(pthread_create(&thread, NULL, read_in_vain, set), 0);
+    assert_ptr_equal(read_in_vain(set), NULL);
+    assert_int_equal(pthread_join(thread, &accepted), 0);
+    assert_ptr_equal(accepted, NULL);
+    assert_string_equal(ascc_particles_message(set), "");
+    ascc_particles_destroy(&set);
+    ascc_context_destroy(&context);
 }
 
 #define IN_2D(fact) cmocka_unit_test_setup_teardown(fact, open_2d, close_fixture)
@@ -1580,6 +1841,8 @@ int main(void)
         IN_3D(options_out_of_range_are_refused),
         IN_3D(longer_options_are_read_if_their_tail_is_zero),
         IN_2D(the_default_quantum_is_2_to_the_minus_28_of_the_power_of_two_below),
+        IN_2D(a_product_that_has_no_default_quantum_is_refused_by_both_names),
+        IN_2D(the_default_mass_is_that_of_water),
         IN_3D(handles_that_are_no_sets_are_refused),
         IN_3D(what_is_added_is_read_again),
         IN_2D(without_velocity_and_mass_fluid_rests_with_the_sets_mass),
@@ -1611,19 +1874,26 @@ int main(void)
         cmocka_unit_test(every_failed_allocation_changes_and_leaks_nothing),
         IN_3D(body_impulse_and_torque_are_sums_over_the_rows_of_a_body),
         IN_2D(torque_in_the_plane_is_its_third_component),
+        IN_2D(a_failed_measure_leaves_its_output_untouched),
+        IN_3D(measures_of_no_known_size_are_refused),
         IN_3D(a_restored_set_is_what_it_was),
         IN_2D(an_empty_set_has_a_snapshot),
         IN_3D(a_snapshot_needs_its_size),
         IN_2D(the_snapshot_is_the_documented_words),
         IN_3D(every_damaged_bit_of_a_snapshot_is_seen),
         IN_2D(impossible_snapshots_with_a_right_checksum_are_refused),
+        IN_2D(a_refused_snapshot_is_told_its_field_and_row),
+        IN_2D(ids_end_at_2_to_the_63_and_never_wrap),
         IN_3D(a_snapshot_of_another_dimension_does_not_match),
         IN_3D(the_hash_does_not_depend_on_order_or_ids),
         IN_3D(the_hash_sees_every_number_of_the_state),
         IN_3D(zero_has_no_sign_for_the_hash),
         IN_2D(equal_particles_do_not_cancel_in_the_hash),
         IN_2D(the_hash_is_the_same_everywhere),
-        IN_2D(a_reading_that_fails_leaves_its_message),
+        IN_2D(snapshot_and_hash_in_2d_are_those_of_version_1),
+        IN_3D(snapshot_and_hash_in_3d_are_those_of_version_1),
+        IN_2D(a_reading_that_fails_changes_no_bit_of_the_set),
+        cmocka_unit_test(readers_that_fail_do_not_race),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -13,7 +13,9 @@
  *   destroy    takes the address of the handle, sets it to NULL and accepts NULL. The order in which
  *              handles are destroyed is free: what others still use lives until they are gone.
  *   errors     every call that can fail returns an ascc_status, and leaves one line that names what
- *              is wrong in the handle it worked on (ascc_context_message and its kin).
+ *              is wrong in the handle it worked on (ascc_context_message and its kin). A call that
+ *              only reads a handle (a pointer to const) leaves it in the context, and changes no bit
+ *              of the handle: any number of threads may read one at once, and fail at it.
  *   units      lengths are in the host's unit, seconds, kilograms. The model works in metres; the
  *              step's option `length_unit` says how many metres the host's unit is.
  *   the library never prints, aborts, exits or keeps global state.
@@ -64,7 +66,15 @@ typedef struct ascc_context ascc_context;
 /** One piece of work for a host's job system: call it once for each index in [0, count). */
 typedef void (*ascc_task)(void *work, int32_t index);
 
-/** Options of ascc_context_create. */
+/**
+ * Options of ascc_context_create.
+ *
+ * The callbacks return to the library: no exception, longjmp or end of the thread may pass through
+ * it. What the call holds by then would leak, and its handle would be half changed. A C++ allocator
+ * that throws is wrapped: catch, return NULL, and the call fails with MEMORY. Callbacks may call the
+ * library with other handles; of the one that the call works on they may read the message alone. They
+ * are called on several threads at once where the host uses the context on several.
+ */
 typedef struct ascc_context_options {
     size_t size;          /* sizeof(ascc_context_options) */
     int32_t thread_count; /* threads a step may use at once, the caller's included; 0 = 1 */
@@ -109,8 +119,9 @@ ASCC_API void ascc_context_destroy(ascc_context **context);
 ASCC_API uint32_t ascc_context_cpu(const ascc_context *context);
 
 /**
- * Copies the message of the last failed ascc_*_create, ascc_model_load or ascc_model_save on this
- * context, or "", into text[capacity], always terminated. Returns its whole length. Any thread.
+ * Copies the message of the last failed ascc_*_create, ascc_model_load, ascc_model_save or reading of
+ * a particle set of this context, or "", into text[capacity], always terminated. Returns its whole
+ * length. Any thread.
  */
 ASCC_API size_t ascc_context_message(const ascc_context *context, char *text, size_t capacity);
 
@@ -192,13 +203,16 @@ typedef enum ascc_scalar { ASCC_FLOAT = 0, ASCC_DOUBLE = 1 } ascc_scalar;
  * Where a host's numbers lie: component c of row i is at data + i * stride + c * component_stride.
  * {data} alone means packed float[count][components]. An array of structs gives the struct's size as
  * stride; separate arrays x, y, z give sizeof(float) as stride and their distance as the other.
+ * component_stride needs a stride: with 0 the call fails with ARGUMENT, since one row for all is not
+ * to be had this way. The structs have no size, so that {data} alone goes on working: they never
+ * grow. Another layout would be told by another value of `reserved`, and only 0 is known here.
  */
 typedef struct ascc_const_array {
     const void *data;           /* NULL = absent, where the call allows that */
     ptrdiff_t stride;           /* bytes from row to row; 0 = packed */
     ptrdiff_t component_stride; /* bytes from component to component; 0 = packed */
     ascc_scalar scalar;
-    int32_t reserved;
+    int32_t reserved; /* 0, else ARGUMENT */
 } ascc_const_array;
 
 typedef struct ascc_array {
@@ -213,9 +227,12 @@ typedef struct ascc_array {
 typedef struct ascc_particles_options {
     size_t size;       /* sizeof(ascc_particles_options) */
     int32_t dimension; /* 2 or 3 */
-    int32_t reserved;
-    double spacing; /* particle spacing, length unit: what the set's model was trained with */
-    double mass;    /* kg, of a particle added without one; 0 = 1 */
+    int32_t reserved;  /* 0, else ARGUMENT */
+    double spacing;    /* particle spacing, length unit: what the set's model was trained with */
+    /* kg, of a particle added without one; 0 = water in SI units: 1000 kg/m^3 times
+     * spacing^dimension, in 2D of a layer one metre deep. Where the length unit is another, or the
+     * fluid, give it: rest density times spacing^dimension, the spacing in metres. */
+    double mass;
     /* Momentum is held in whole multiples of this, kg length/s; 0 = 2^-28 of the power of two below
      * mass * spacing / s: fine enough for 1e-9 spacings/s, coarse enough for 1e10. */
     double momentum_quantum;
@@ -225,7 +242,8 @@ typedef struct ascc_particles_options {
 /**
  * Makes an empty particle set.
  *
- * errors    ARGUMENT (dimension, spacing, mass or quantum out of range; NULL), MEMORY.
+ * errors    ARGUMENT (dimension, spacing, mass or quantum out of range; mass times spacing too large
+ *           or too small for a default quantum; NULL), MEMORY.
  * threads   one thread at a time per particle set; reading is not changing.
  */
 ASCC_API ascc_status ascc_particles_create(ascc_context *context,
@@ -243,8 +261,10 @@ ASCC_API ascc_status ascc_particles_reserve(ascc_particles *particles, size_t fl
  * position  [count][dimension], length unit
  * velocity  [count][dimension], length unit / s; data NULL = at rest. NULL pointer likewise.
  * mass      [count], kg, > 0; NULL = the set's
- * ids       uint64_t[count], receives ids that stay with the particles; NULL if not wanted.
- * errors    ARGUMENT (mass <= 0), MEMORY, NOT_FINITE, RANGE; on error nothing was added.
+ * ids       uint64_t[count], receives ids that stay with the particles; NULL if not wanted. Ids count
+ *           up over both kinds; none is given twice, unless a restore turns the count back.
+ * errors    ARGUMENT (mass <= 0), MEMORY, NOT_FINITE, RANGE (also where ids would pass 2^63); on error
+ *           nothing was added.
  */
 ASCC_API ascc_status ascc_particles_add_fluid(ascc_particles *particles, size_t count,
                                               const ascc_const_array *position,
@@ -268,7 +288,7 @@ ASCC_API ascc_status ascc_particles_add_boundary(ascc_particles *particles, size
  * Removes particles of either kind by id; the others keep their order.
  *
  * errors    ARGUMENT: an id unknown, or given twice; then nothing was removed. MEMORY.
- * cost      O(particles + count log count).
+ * cost      O(particles + count log particles).
  */
 ASCC_API ascc_status ascc_particles_remove(ascc_particles *particles, size_t count,
                                            const uint64_t *ids);
@@ -278,7 +298,7 @@ ASCC_API ascc_status ascc_particles_clear(ascc_particles *particles, ascc_kind k
 
 /**
  * Makes the fluid `count` particles: drops the last rows, or adds rows at the origin, at rest and
- * with the set's mass, whose positions the caller sets next. errors: ARGUMENT, MEMORY.
+ * with the set's mass, whose positions the caller sets next. errors: ARGUMENT, MEMORY, RANGE (ids).
  */
 ASCC_API ascc_status ascc_particles_resize_fluid(ascc_particles *particles, size_t count);
 
@@ -355,8 +375,8 @@ ASCC_API ascc_status ascc_particles_snapshot(const ascc_particles *particles, vo
 
 /**
  * Makes the set what it was when the snapshot was taken; a run goes on from there bit for bit.
- * errors: ARGUMENT, FORMAT (not a snapshot, damaged), MISMATCH (other dimension), MEMORY; on error
- * the set is unchanged.
+ * errors: ARGUMENT, FORMAT (not a snapshot, damaged, or of what no set can be; the message tells field
+ * and row), MISMATCH (other dimension), MEMORY; on error the set is unchanged.
  */
 ASCC_API ascc_status ascc_particles_restore(ascc_particles *particles, const void *memory,
                                             size_t size);
@@ -367,7 +387,10 @@ ASCC_API ascc_status ascc_particles_restore(ascc_particles *particles, const voi
  */
 ASCC_API uint64_t ascc_particles_hash(const ascc_particles *particles);
 
-/** The message of the last call on this set that failed, or "". The set's, until its next call. */
+/**
+ * The message of the last failed call that changes this set, or measures it, or "". The set's, until
+ * the next such call. Calls that only read the set leave theirs in its context: ascc_context_message.
+ */
 ASCC_API const char *ascc_particles_message(const ascc_particles *particles);
 
 /** What ascc_particles_measure finds. Sums run over the fluid in the host's units. */
@@ -388,7 +411,10 @@ typedef struct ascc_measures {
     uint64_t close_count; /* fluid particles with another nearer than half a spacing */
 } ascc_measures;
 
-/** Measures the set (METHOD section 9). errors: ARGUMENT, MEMORY, RANGE. cost: one neighbour search. */
+/**
+ * Measures the set (METHOD section 9). errors: ARGUMENT, MEMORY, RANGE; on error measures are
+ * untouched. cost: one neighbour search. threads: one at a time, since it leaves its message in the set.
+ */
 ASCC_API ascc_status ascc_particles_measure(ascc_particles *particles, ascc_measures *measures);
 
 /* ---- Step: a model bound to the scratch memory it needs to advance particles ------------------ */

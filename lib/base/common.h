@@ -33,6 +33,9 @@ ascc_status ascc_fail(ascc_message *message, ascc_status status, const char *for
  * smaller than `first_size` (the first released layout), or longer with a tail that is not zero. */
 bool ascc_read_struct(void *into, size_t into_size, const void *from, size_t first_size);
 
+/* Whether a struct that begins with its size is none smaller than the first released layout. */
+bool ascc_struct_is_known(const void *from, size_t first_size);
+
 /* The same for results: writes min(the caller's size, from_size) bytes and keeps the caller's size.
  */
 bool ascc_write_struct(void *into, const void *from, size_t from_size, size_t first_size);

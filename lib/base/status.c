@@ -57,11 +57,23 @@ ascc_status ascc_fail(ascc_message *message, ascc_status status, const char *for
     return status;
 }
 
-bool ascc_read_struct(void *into, size_t into_size, const void *from, size_t first_size)
+static size_t struct_size(const void *from)
 {
     size_t size;
     memcpy(&size, from, sizeof size);
-    if (size < first_size || size > PLAUSIBLE_STRUCT_SIZE)
+    return size;
+}
+
+bool ascc_struct_is_known(const void *from, size_t first_size)
+{
+    const size_t size = struct_size(from);
+    return size >= first_size && size <= PLAUSIBLE_STRUCT_SIZE;
+}
+
+bool ascc_read_struct(void *into, size_t into_size, const void *from, size_t first_size)
+{
+    const size_t size = struct_size(from);
+    if (!ascc_struct_is_known(from, first_size))
         return false;
     const unsigned char *const bytes = from;
     for (size_t i = into_size; i < size; i++)
@@ -74,9 +86,8 @@ bool ascc_read_struct(void *into, size_t into_size, const void *from, size_t fir
 
 bool ascc_write_struct(void *into, const void *from, size_t from_size, size_t first_size)
 {
-    size_t size;
-    memcpy(&size, into, sizeof size);
-    if (size < first_size || size > PLAUSIBLE_STRUCT_SIZE)
+    const size_t size = struct_size(into);
+    if (!ascc_struct_is_known(into, first_size))
         return false;
     memcpy(into, from, ascc_min_size(size, from_size));
     memcpy(into, &size, sizeof size);

@@ -13,6 +13,7 @@
 #define ASCC_PAIR_SUM_H
 
 #include "network.h"
+#include "points/particles.h"
 
 /* Impulses in quanta, [host's rows][dimension]. */
 typedef struct ascc_impulses {
@@ -28,9 +29,6 @@ typedef struct ascc_impulse_scale {
 
 /* The greatest impulse of one pair, quanta. */
 #define ASCC_IMPULSE_LIMIT ((double)((int64_t)1 << 50))
-
-/* Where a wall's sum of impulses is called full: one more cannot overflow it. */
-#define ASCC_WALL_LIMIT ((int64_t)1 << 62)
 
 /* Pairs of one row, evaluated together. */
 #define ASCC_PAIR_BATCH 64

@@ -134,12 +134,12 @@ static ascc_status measure_density(const ascc_particles *p, ascc_arena *arena, a
 
 ascc_status ascc_particles_measure(ascc_particles *particles, ascc_measures *measures)
 {
-    if (!particles || particles->magic != ASCC_PARTICLES_MAGIC)
+    if (!ascc_particles_is_set(particles))
         return ASCC_ERROR_ARGUMENT;
     ascc_measures m = {0};
-    if (!measures || !ascc_write_struct(measures, &m, sizeof m, sizeof m))
+    if (!measures || !ascc_struct_is_known(measures, sizeof m))
         return ascc_particles_fail(particles, ASCC_ERROR_ARGUMENT,
-                                   "ascc_measures.size is not understood");
+                                   "measures: NULL, or of a size not known here");
     measure_motion(particles, &m);
     ascc_arena arena;
     ascc_arena_open(&arena, &particles->context->allocator);

@@ -251,18 +251,19 @@ static ascc_status read_forces(ascc_step *step, const ascc_particles *p, const a
             return ascc_fail(&step->message, ASCC_ERROR_NOT_FINITE,
                              "gravity: component %zu is not finite", c);
     }
-    if (!f.acceleration || !f.acceleration->data)
+    if (ascc_host_array_is_absent(f.acceleration))
         return ASCC_OK;
-    if (!ascc_scalar_known(f.acceleration->scalar) || f.acceleration->reserved != 0)
-        return ascc_fail(&step->message, ASCC_ERROR_ARGUMENT,
-                         "acceleration: scalar %d, reserved %ld: not an array known here",
-                         (int)f.acceleration->scalar, (long)f.acceleration->reserved);
+    ascc_host_array from;
+    const ascc_status status =
+        ascc_host_array_open("acceleration", f.acceleration, p->dimension, &from, &step->message);
+    if (status != ASCC_OK)
+        return status;
     if (!ascc_grow(&step->context->allocator, (void **)&step->acceleration,
                    &step->acceleration_capacity, p->fluid_count * d, sizeof(double)))
         return ascc_fail(&step->message, ASCC_ERROR_MEMORY, "no memory for the acceleration");
     for (size_t i = 0; i < p->fluid_count; i++)
         for (size_t c = 0; c < d; c++) {
-            const double a = ascc_array_read(f.acceleration, i, c, d);
+            const double a = ascc_host_array_read(&from, i, (int32_t)c);
             if (!isfinite(a))
                 return ascc_fail(&step->message, ASCC_ERROR_NOT_FINITE,
                                  "acceleration: row %zu component %zu is not finite", i, c);

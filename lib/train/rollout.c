@@ -116,6 +116,7 @@ static ascc_status open_particles(rollout *r)
     const ascc_particles_options options = {.size = sizeof options,
                                             .dimension = s->dimension,
                                             .spacing = r->plan->spacing,
+                                            .mass = 1, /* equal masses cancel */
                                             .fluid_capacity = s->fluid_count,
                                             .boundary_capacity = s->boundary_count};
     ascc_placement_apply(&r->task->placement, s->dimension, s->wall, s->boundary_count, false,

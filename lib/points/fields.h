@@ -1,0 +1,98 @@
+/* The arrays of a particle set, each listed once. SPDX-License-Identifier: MIT */
+#ifndef ASCC_FIELDS_H
+#define ASCC_FIELDS_H
+
+#include "base/common.h"
+
+/*
+ * To add a field, add a line: its member of struct ascc_particles, place in the block, growing,
+ * copying, removal, snapshot, restore and hash follow from it. Its rows are added as zeros.
+ *
+ *   kind     of particle that has it
+ *   member   of struct ascc_particles: a pointer to the first row
+ *   type     of a number: double, int64_t, uint64_t or int32_t
+ *   numbers  of a row: VECTOR (`dimension`) or SCALAR (one)
+ *   hash     HASHED, or UNHASHED: what depends on the order of rows or on the past
+ *   access   what ascc_particles_set and ascc_particles_get call it, or PRIVATE
+ *   check    a function of fields.c that says what a row may be, for the host's numbers and for
+ *            snapshots; NULL = anything
+ *
+ * The order is that of memory, snapshot and hash. A line more is a snapshot of another version.
+ */
+#define ASCC_PARTICLE_FIELDS(X)                                                                    \
+    X(ASCC_FLUID, position, double, VECTOR, HASHED, ASCC_POSITION, check_position)                 \
+    X(ASCC_FLUID, momentum, int64_t, VECTOR, HASHED, ASCC_VELOCITY, check_momentum) /* quanta */   \
+    X(ASCC_FLUID, mass, double, SCALAR, HASHED, ASCC_MASS, check_mass)                             \
+    X(ASCC_FLUID, id, uint64_t, SCALAR, UNHASHED, PRIVATE, NULL) /* ascend: see snapshot.c */      \
+    X(ASCC_BOUNDARY, wall_position, double, VECTOR, HASHED, ASCC_POSITION, check_position)         \
+    X(ASCC_BOUNDARY, wall_normal, double, VECTOR, HASHED, ASCC_NORMAL, check_normal)               \
+    X(ASCC_BOUNDARY, wall_impulse, int64_t, VECTOR, UNHASHED, PRIVATE, NULL) /* quanta */          \
+    X(ASCC_BOUNDARY, wall_id, uint64_t, SCALAR, UNHASHED, PRIVATE, NULL)                           \
+    X(ASCC_BOUNDARY, wall_body, int32_t, SCALAR, HASHED, PRIVATE, check_body)
+
+/* Raise it with every change of the list. */
+#define ASCC_SNAPSHOT_VERSION 1
+
+/* Where a field stands in the list: ASCC_FIELD_position and so on. */
+typedef enum ascc_field_index {
+#define ASCC_LISTED(kind, member, ...) ASCC_FIELD_##member,
+    ASCC_PARTICLE_FIELDS(ASCC_LISTED)
+#undef ASCC_LISTED
+        ASCC_FIELD_COUNT
+} ascc_field_index;
+
+/* What a number is; all but the last take eight bytes. */
+typedef enum ascc_element { ASCC_REAL, ASCC_INTEGER, ASCC_SMALL_INTEGER } ascc_element;
+
+/* A row that is to be stored. */
+typedef struct ascc_candidate {
+    const char *name; /* of its array, for the message */
+    size_t row;
+    const void *values; /* as the field holds them */
+    int32_t numbers;
+    double spacing;
+} ascc_candidate;
+
+typedef ascc_status ascc_row_check(const ascc_candidate *row, ascc_message *message);
+
+typedef struct ascc_particle_field {
+    const char *name;
+    ascc_kind kind;
+    ascc_element element;
+    bool vector, hashed;
+    int32_t access; /* an ascc_field, or negative */
+    size_t offset;  /* of the pointer in struct ascc_particles */
+    ascc_row_check *check;
+} ascc_particle_field;
+
+extern const ascc_particle_field ascc_particle_fields[ASCC_FIELD_COUNT];
+
+static inline size_t ascc_field_element_size(const ascc_particle_field *field)
+{
+    return field->element == ASCC_SMALL_INTEGER ? sizeof(int32_t) : sizeof(int64_t);
+}
+
+/* Numbers of a row. */
+static inline int32_t ascc_field_numbers(const ascc_particle_field *field, int32_t dimension)
+{
+    return field->vector ? dimension : 1;
+}
+
+/* Bytes of a row. */
+static inline size_t ascc_field_row_size(const ascc_particle_field *field, int32_t dimension)
+{
+    return (size_t)ascc_field_numbers(field, dimension) * ascc_field_element_size(field);
+}
+
+/* The first row. */
+void *ascc_field_rows(const ascc_particles *particles, const ascc_particle_field *field);
+void ascc_field_point(ascc_particles *particles, const ascc_particle_field *field, void *rows);
+
+/* "NAME: row ROW component C is VALUE", and why that is not right. */
+ascc_status ascc_fail_number(ascc_message *message, ascc_status status, const char *name,
+                             size_t row, int32_t component, double value, const char *why);
+
+/* For messages: a NaN has a sign, which nobody wants to read. */
+double ascc_readable(double value);
+
+#endif
