@@ -36,10 +36,8 @@ int main(int argc, char **argv)
     ascc_model_info info = {.size = sizeof info};
     check(ascc_model_get_info(model, &info), "info", message);
     const double h = info.particle_spacing;
-    const ascc_particles_options fluid = {.size = sizeof fluid,
-                                          .dimension = info.dimension,
-                                          .spacing = h,
-                                          .mass = info.rest_density * h * h * h};
+    ascc_particles_options fluid = {.size = sizeof fluid};
+    check(ascc_model_particles_options(model, 1.0, &fluid), "options", message);
     check(ascc_particles_create(context, &fluid, &particles), "particles", message);
 
     /* In 2D the third number of a row is left out. */

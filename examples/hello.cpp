@@ -46,8 +46,7 @@ static void run(const char *path)
 
     ascc_particles_options options = {};
     options.size = sizeof options;
-    options.dimension = info.dimension;
-    options.spacing = info.particle_spacing;
+    check(ascc_model_particles_options(model.get(), 1.0, &options), "options");
     ascc_particles *particles_handle = nullptr;
     check(ascc_particles_create(context.get(), &options, &particles_handle), "particles");
     const Particles particles(particles_handle);

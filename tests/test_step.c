@@ -987,6 +987,212 @@ static void statistics_tell_what_happened(void **state)
     close_world(&w);
 }
 
+static void sums_and_times_are_of_the_whole_run(void **state)
+{
+    (void)state;
+    const world_options o = {.dimension = 3, .threads = 2, .walls = true, .random_network = true};
+    world whole = open_world(&o), parts = open_world(&o);
+    int64_t external[3] = {0}, wall[3] = {0}, body[3] = {0}, all[3];
+    for (int n = 0; n < 4; n++) {
+        int64_t impulse[3];
+        run(&parts, down, 1);
+        const ascc_step_statistics s = statistics_of(&parts);
+        assert_int_equal(ascc_particles_body_impulse(parts.particles, -1, NULL, impulse, NULL),
+                         ASCC_OK);
+        for (int c = 0; c < 3; c++) {
+            external[c] += s.external_impulse[c];
+            wall[c] += s.wall_impulse[c];
+            body[c] += impulse[c];
+        }
+    }
+    int64_t before[3];
+    assert_int_equal(ascc_particles_total_momentum(whole.particles, before), ASCC_OK);
+    run(&whole, down, 4);
+    const ascc_step_statistics s = statistics_of(&whole);
+    assert_int_equal(ascc_particles_body_impulse(whole.particles, -1, NULL, all, NULL), ASCC_OK);
+    assert_true(wall[1] != 0);
+    for (int c = 0; c < 3; c++) {
+        assert_true(s.external_impulse[c] == external[c] && s.wall_impulse[c] == wall[c]);
+        assert_true(all[c] == body[c] && s.momentum_before[c] == before[c]);
+        assert_true(before[c] + external[c] - wall[c] == s.momentum_after[c]);
+    }
+    close_world(&whole);
+    close_world(&parts);
+}
+
+static void a_run_of_nothing_leaves_no_old_statistics(void **state)
+{
+    (void)state;
+    const world_options o = {.dimension = 3, .threads = 1, .walls = true, .random_network = true};
+    world w = open_world(&o);
+    run(&w, down, 2);
+    assert_int_equal(ascc_step_run(w.step, w.particles, NULL, 0), ASCC_OK);
+    ascc_step_statistics s = statistics_of(&w);
+    assert_true(s.steps == 0 && s.seconds_total == 0.0 && s.pair_count == 0 && s.stage_count == 0);
+    assert_true(s.wall_impulse[1] == 0 && s.external_impulse[1] == 0);
+    run(&w, down, 2);
+    assert_int_equal(ascc_particles_clear(w.particles, ASCC_FLUID), ASCC_OK);
+    run(&w, down, 1);
+    s = statistics_of(&w);
+    assert_true(s.steps == 1 && s.pair_count == 0 && s.neighbor_count == 0);
+    assert_true(s.momentum_before[1] == 0 && s.momentum_after[1] == 0 && s.wall_impulse[1] == 0);
+    close_world(&w);
+}
+
+static void another_spacing_than_the_models_is_a_mismatch_with_both_numbers(void **state)
+{
+    (void)state;
+    const world_options o = {.dimension = 3, .threads = 1};
+    world w = open_world(&o);
+    const struct {
+        double spacing, unit;
+        ascc_status status;
+    } cases[] = {{5.0, 0.0, ASCC_ERROR_MISMATCH},   {5.0, 0.01, ASCC_OK},
+                 {0.05, 0.01, ASCC_ERROR_MISMATCH}, {0.051, 1.0, ASCC_ERROR_MISMATCH},
+                 {(double)0.05f, 1.0, ASCC_OK},     {1e-300, 1.0, ASCC_ERROR_MISMATCH}};
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        const ascc_particles_options p = {.size = sizeof p,
+                                          .dimension = 3,
+                                          .spacing = cases[i].spacing,
+                                          .mass = 1.0,
+                                          .momentum_quantum = 1e-9};
+        const ascc_step_options s = {.size = sizeof s, .length_unit = cases[i].unit};
+        const double x[3] = {0.0, 0.0, 0.0};
+        const ascc_const_array at = {.data = x, .scalar = ASCC_DOUBLE};
+        ascc_particles *set;
+        ascc_step *step;
+        assert_int_equal(ascc_particles_create(w.context, &p, &set), ASCC_OK);
+        assert_int_equal(ascc_particles_add_fluid(set, 1, &at, NULL, NULL, NULL), ASCC_OK);
+        assert_int_equal(ascc_step_create(w.context, w.model, &s, &step), ASCC_OK);
+        const uint64_t hash = ascc_particles_hash(set);
+        assert_int_equal(ascc_step_run(step, set, NULL, 1), cases[i].status);
+        if (cases[i].status != ASCC_OK) {
+            assert_non_null(strstr(ascc_step_message(step), "0.05 m"));
+            assert_true(ascc_particles_hash(set) == hash);
+        }
+        ascc_step_destroy(&step);
+        ascc_particles_destroy(&set);
+    }
+    close_world(&w);
+}
+
+static void particle_options_of_a_model_are_those_it_steps(void **state)
+{
+    (void)state;
+    for (int dimension = 2; dimension <= 3; dimension++) {
+        const world_options o = {.dimension = dimension, .threads = 1};
+        world w = open_world(&o);
+        ascc_model_info info = {.size = sizeof info};
+        assert_int_equal(ascc_model_get_info(w.model, &info), ASCC_OK);
+        ascc_particles_options p = {.size = sizeof p};
+        assert_int_equal(ascc_model_particles_options(w.model, 0.01, &p), ASCC_OK);
+        const double h = info.particle_spacing;
+        assert_true(p.dimension == dimension && fabs(p.spacing - 100.0 * h) < 1e-12 * p.spacing);
+        assert_true(fabs(p.mass - info.rest_density * pow(h, dimension)) < 1e-12 * p.mass);
+        ascc_particles *set;
+        ascc_step *step;
+        const ascc_step_options s = {.size = sizeof s, .length_unit = 0.01};
+        assert_int_equal(ascc_particles_create(w.context, &p, &set), ASCC_OK);
+        assert_int_equal(ascc_step_create(w.context, w.model, &s, &step), ASCC_OK);
+        assert_int_equal(ascc_step_run(step, set, NULL, 1), ASCC_OK);
+        ascc_step_destroy(&step);
+        ascc_particles_destroy(&set);
+        assert_int_equal(ascc_model_particles_options(NULL, 1.0, &p), ASCC_ERROR_ARGUMENT);
+        assert_int_equal(ascc_model_particles_options(w.model, -1.0, &p), ASCC_ERROR_ARGUMENT);
+        assert_int_equal(ascc_model_particles_options(w.model, NAN, &p), ASCC_ERROR_ARGUMENT);
+        assert_int_equal(ascc_model_particles_options(w.model, 1.0, NULL), ASCC_ERROR_ARGUMENT);
+        close_world(&w);
+    }
+}
+
+/* A step of the world's model with another time step. */
+static ascc_status step_of(const world *w, double time_step, ascc_step **step)
+{
+    const ascc_step_options o = {.size = sizeof o, .time_step = time_step};
+    return ascc_step_create(w->context, w->model, &o, step);
+}
+
+static void a_long_time_step_is_cut_into_steps_of_the_model(void **state)
+{
+    (void)state;
+    const world_options o = {.dimension = 3, .threads = 2, .walls = true, .random_network = true};
+    world whole = open_world(&o), parts = open_world(&o);
+    ascc_model_info info = {.size = sizeof info};
+    assert_int_equal(ascc_model_get_info(whole.model, &info), ASCC_OK);
+    assert_true(info.time_step_max == info.time_step && info.time_step_min < info.time_step);
+    ascc_step *step;
+    assert_int_equal(step_of(&whole, 5.0 * info.time_step, &step), ASCC_OK);
+    assert_int_equal(ascc_step_run(step, whole.particles, NULL, 2), ASCC_OK);
+    run(&parts, NULL, 10);
+    assert_true(ascc_particles_hash(whole.particles) == ascc_particles_hash(parts.particles));
+    ascc_step_statistics s = {.size = sizeof s};
+    assert_int_equal(ascc_step_get_statistics(step, &s), ASCC_OK);
+    const ascc_step_statistics t = statistics_of(&parts);
+    assert_true(s.steps == 2 && s.substeps == 5 && t.steps == 10 && t.substeps == 1);
+    for (int c = 0; c < 3; c++)
+        assert_true(s.wall_impulse[c] == t.wall_impulse[c] &&
+                    s.external_impulse[c] == t.external_impulse[c]);
+    ascc_step_destroy(&step);
+    /* out of every range */
+    assert_int_equal(step_of(&whole, 1001.0 * info.time_step, &step), ASCC_ERROR_RANGE);
+    assert_int_equal(step_of(&whole, 0.5 * info.time_step_min, &step), ASCC_ERROR_RANGE);
+    close_world(&whole);
+    close_world(&parts);
+}
+
+static void a_failing_substep_takes_all_of_its_step_back(void **state)
+{
+    (void)state;
+    const world_options o = {.dimension = 3, .threads = 1, .walls = true, .random_network = true};
+    world w = open_world(&o);
+    ascc_model_info info = {.size = sizeof info};
+    assert_int_equal(ascc_model_get_info(w.model, &info), ASCC_OK);
+    const double dt = info.time_step, start = 0.2 * spacing / dt;
+    double v[3] = {0.0, -start, 0.0};
+    const ascc_const_array velocity = {.data = v, .scalar = ASCC_DOUBLE};
+    for (size_t i = 0; i < w.particles->fluid_count; i++)
+        assert_int_equal(
+            ascc_particles_set(w.particles, ASCC_FLUID, ASCC_VELOCITY, i, 1, &velocity), ASCC_OK);
+    /* falls faster with each substep, until the third moves a particle too far */
+    const double pull[3] = {0.0, -4.0 * spacing / dt / dt, 0.0};
+    const ascc_forces forces = {.size = sizeof forces, .gravity = pull};
+    const ascc_step_options far = {
+        .size = sizeof far, .time_step = 4.0 * dt, .max_displacement = 10.0 * spacing};
+    ascc_step *step;
+    assert_int_equal(ascc_step_create(w.context, w.model, &far, &step), ASCC_OK);
+    const uint64_t hash = ascc_particles_hash(w.particles);
+    assert_int_equal(ascc_step_run(step, w.particles, &forces, 3), ASCC_ERROR_RANGE);
+    assert_true(ascc_particles_hash(w.particles) == hash);
+    ascc_step_statistics s = {.size = sizeof s};
+    assert_int_equal(ascc_step_get_statistics(step, &s), ASCC_OK);
+    assert_true(s.steps == 0 && s.external_impulse[1] == 0);
+    ascc_step_destroy(&step);
+    close_world(&w);
+}
+
+static void a_way_of_more_than_64_spacings_is_an_error_unless_allowed(void **state)
+{
+    (void)state;
+    for (int allowed = 0; allowed < 2; allowed++) {
+        const world_options o = {.dimension = 2, .threads = 1};
+        world w = open_world(&o);
+        ascc_model_info info = {.size = sizeof info};
+        assert_int_equal(ascc_model_get_info(w.model, &info), ASCC_OK);
+        const double v[2] = {65.0 * spacing / info.time_step, 0.0};
+        const ascc_const_array velocity = {.data = v, .scalar = ASCC_DOUBLE};
+        assert_int_equal(
+            ascc_particles_set(w.particles, ASCC_FLUID, ASCC_VELOCITY, 0, 1, &velocity), ASCC_OK);
+        const ascc_step_options options = {.size = sizeof options,
+                                           .max_displacement = allowed ? INFINITY : 0.0};
+        ascc_step *step;
+        assert_int_equal(ascc_step_create(w.context, w.model, &options, &step), ASCC_OK);
+        assert_int_equal(ascc_step_run(step, w.particles, NULL, 1),
+                         allowed ? ASCC_OK : ASCC_ERROR_RANGE);
+        ascc_step_destroy(&step);
+        close_world(&w);
+    }
+}
+
 static void measures_of_a_lattice_at_rest_are_those_of_rest(void **state)
 {
     (void)state;
@@ -1208,6 +1414,13 @@ int main(void)
         cmocka_unit_test(the_estimate_of_scratch_is_within_a_factor_of_two),
         cmocka_unit_test(a_reserved_step_grows_once),
         cmocka_unit_test(statistics_tell_what_happened),
+        cmocka_unit_test(a_way_of_more_than_64_spacings_is_an_error_unless_allowed),
+        cmocka_unit_test(a_failing_substep_takes_all_of_its_step_back),
+        cmocka_unit_test(a_long_time_step_is_cut_into_steps_of_the_model),
+        cmocka_unit_test(particle_options_of_a_model_are_those_it_steps),
+        cmocka_unit_test(another_spacing_than_the_models_is_a_mismatch_with_both_numbers),
+        cmocka_unit_test(a_run_of_nothing_leaves_no_old_statistics),
+        cmocka_unit_test(sums_and_times_are_of_the_whole_run),
         cmocka_unit_test(measures_of_a_lattice_at_rest_are_those_of_rest),
     };
     return cmocka_run_group_tests_name("step", tests, NULL, NULL);

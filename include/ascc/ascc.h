@@ -240,6 +240,17 @@ typedef struct ascc_particles_options {
 } ascc_particles_options;
 
 /**
+ * The options of a particle set that suits a model: dimension, spacing, and as mass the rest density times
+ * spacing^dimension; the rest zero. A step of the model refuses other spacings (MISMATCH).
+ *
+ * length_unit  metres in one unit of the host's length; 0 = 1. Give ascc_step_create the same
+ * options      options->size set by the caller; receives the rest
+ * errors       ARGUMENT (no model; a length_unit negative or not finite).
+ */
+ASCC_API ascc_status ascc_model_particles_options(const ascc_model *model, double length_unit,
+                                                  ascc_particles_options *options);
+
+/**
  * Makes an empty particle set.
  *
  * errors    ARGUMENT (dimension, spacing, mass or quantum out of range; mass times spacing too large

@@ -4,6 +4,7 @@
 #include "description.h"
 #include "file/safetensors.h"
 
+#include <math.h>
 #include <stdatomic.h>
 #include <stdio.h>
 #include <string.h>
@@ -271,4 +272,19 @@ ascc_status ascc_model_get_info(const ascc_model *model, ascc_model_info *info)
         .multiply_adds = ascc_cost(plan, &counts),
     };
     return ascc_write_struct(info, &own, sizeof own, sizeof own) ? ASCC_OK : ASCC_ERROR_ARGUMENT;
+}
+
+ascc_status ascc_model_particles_options(const ascc_model *model, double length_unit,
+                                         ascc_particles_options *options)
+{
+    if (!alive(model) || !options || !(length_unit >= 0.0 && isfinite(length_unit)))
+        return ASCC_ERROR_ARGUMENT;
+    const ascc_plan *plan = &model->plan;
+    const double area = plan->spacing * plan->spacing;
+    const double volume = plan->dimension == 2 ? area : area * plan->spacing;
+    const ascc_particles_options own = {.dimension = plan->dimension,
+                                        .spacing =
+                                            plan->spacing / (length_unit > 0.0 ? length_unit : 1.0),
+                                        .mass = plan->rest_density * volume};
+    return ascc_write_struct(options, &own, sizeof own, sizeof own) ? ASCC_OK : ASCC_ERROR_ARGUMENT;
 }
