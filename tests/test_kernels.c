@@ -423,6 +423,81 @@ static void at_the_centre_only_the_first_harmonic_counts(void **state)
     drop_pairs(&p);
 }
 
+/* The numbers of a pair, as kernels.h states them. */
+static void numbers_of(const float u[3], const float *vector, const float own[3], int wall,
+                       size_t dimension, double q[8])
+{
+    double relative[3];
+    for (size_t c = 0; c < 3; c++) {
+        const double other = c < dimension ? (double)vector[c] : 0.0;
+        relative[c] = (wall ? 0.0 : other) - (double)own[c];
+        q[1 + c] = (double)u[c];
+        q[5 + c] = wall ? other : relative[c];
+    }
+    q[0] = 1.0;
+    q[4] = -((double)u[0] * relative[0] + (double)u[1] * relative[1] + (double)u[2] * relative[2]);
+}
+
+static void moments_equal_doubles_and_have_the_same_bits_on_every_cpu(void **state)
+{
+    (void)state;
+    ascc_kernels table[16];
+    const int count = tables(table);
+    for (size_t variant = 0; variant < 8 * 2 * 2 * 2; variant++) {
+        const size_t bumps = 1 + variant % 8, dimension = 2 + variant / 8 % 2;
+        const int wall = (int)(variant / 16 % 2), weighted = (int)(variant / 32 % 2);
+        for (size_t k = 0; k < 20; k++) {
+            const size_t a = 8 + 8 * (k % 2);
+            float *coordinate[4], *feature = floats(51 * a), *weight = floats(50 * 3);
+            float own[3] = {0.3f, -0.2f, dimension == 3 ? 0.9f : 0.0f};
+            uint32_t neighbor[24];
+            for (size_t c = 0; c < 4; c++) {
+                coordinate[c] = floats(24);
+                for (size_t i = 0; i < 24; i++)
+                    coordinate[c][i] = c == 3   ? fabsf(coordinate[c][i])
+                                       : c == 2 ? (dimension == 3 ? coordinate[c][i] : 0.0f)
+                                                : coordinate[c][i];
+            }
+            coordinate[3][k % 20] = 1.0f; /* the very edge */
+            for (size_t i = 0; i < 24; i++)
+                neighbor[i] = next() % 50;
+            const ascc_pairs pairs = {.x = coordinate[0],
+                                      .y = coordinate[1],
+                                      .z = coordinate[2],
+                                      .distance = coordinate[3]};
+            float *want = guarded(bumps * 8);
+            table[0].moments(&pairs, neighbor, k, feature, a, own, wall, dimension,
+                             weighted ? weight : NULL, 3, bumps, want);
+            check_guard(want, bumps * 8);
+            for (size_t b = 0; b < bumps; b++) {
+                double sum[8] = {0.0}, q[8];
+                for (size_t i = 0; i < k; i++) {
+                    const float u[3] = {coordinate[0][i], coordinate[1][i], coordinate[2][i]};
+                    const double share = bump_of((double)coordinate[3][i], bumps, b) *
+                                         (weighted ? (double)weight[neighbor[i] * 3] : 1.0);
+                    numbers_of(u, feature + neighbor[i] * a, own, wall, dimension, q);
+                    for (size_t n = 0; n < 8; n++)
+                        sum[n] += share * q[n];
+                }
+                for (size_t n = 0; n < 8; n++)
+                    assert_true(fabs(sum[n] - (double)want[b * 8 + n]) < 1e-5 * (double)(k + 1));
+            }
+            for (int t = 1; t < count; t++) {
+                float *got = guarded(bumps * 8);
+                table[t].moments(&pairs, neighbor, k, feature, a, own, wall, dimension,
+                                 weighted ? weight : NULL, 3, bumps, got);
+                check_same_bits(want, got, bumps * 8 + 8, "moments");
+                free(got);
+            }
+            for (size_t c = 0; c < 4; c++)
+                free(coordinate[c]);
+            free(feature);
+            free(weight);
+            free(want);
+        }
+    }
+}
+
 static void pair_strengths_equal_doubles_and_have_the_same_bits_on_every_cpu(void **state)
 {
     (void)state;
@@ -734,6 +809,7 @@ int main(void)
         cmocka_unit_test(the_volume_map_fills_the_cube_and_stays_inside),
         cmocka_unit_test(the_basis_equals_doubles_and_has_the_same_bits_on_every_cpu),
         cmocka_unit_test(at_the_centre_only_the_first_harmonic_counts),
+        cmocka_unit_test(moments_equal_doubles_and_have_the_same_bits_on_every_cpu),
         cmocka_unit_test(pair_strengths_equal_doubles_and_have_the_same_bits_on_every_cpu),
         cmocka_unit_test(gather_equals_doubles_and_has_the_same_bits_on_every_cpu),
         cmocka_unit_test(multiply_equals_doubles_and_has_the_same_bits_on_every_cpu),

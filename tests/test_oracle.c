@@ -204,6 +204,28 @@ static void levels_equal_doubles(void **state)
     print_message("# levels: %.2g\n", worst);
 }
 
+static void moments_equal_doubles(void **state)
+{
+    (void)state;
+    double worst = 0.0;
+    for (int v = 0; v < 24; v++) {
+        const model_random random = {.seed = 500 + (uint64_t)v,
+                                     .dimension = 2 + v % 2,
+                                     .spacing = SPACING,
+                                     .moments = 1 + v % 7,
+                                     .bumps = 2 + v % 3,
+                                     .order = 1,
+                                     .fluid_only = 1,
+                                     .motion = 1 + v / 3 % 2,
+                                     .damping = v / 2 % 2,
+                                     .walls = v / 5 % 2,
+                                     .scale = 0.001,
+                                     .evaluate = v / 4 % 2 ? "current" : "advected"};
+        worst = fmax(worst, check("moments", v, &random));
+    }
+    print_message("# moments: %.2g\n", worst);
+}
+
 static void bases_equal_doubles(void **state)
 {
     (void)state;
@@ -255,6 +277,7 @@ int main(void)
         cmocka_unit_test(plain_outputs_equal_doubles),
         cmocka_unit_test(levels_equal_doubles),
         cmocka_unit_test(bases_equal_doubles),
+        cmocka_unit_test(moments_equal_doubles),
         cmocka_unit_test(motion_and_its_damping_equal_doubles),
     };
     return cmocka_run_group_tests_name("oracle", tests, NULL, NULL);

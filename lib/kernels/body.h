@@ -416,6 +416,78 @@ static void pair_strengths(const float *distance, const uint32_t *neighbor, size
     }
 }
 
+/* Eight pairs: where they lie among the bumps, and what both bumps that reach them give. */
+typedef struct reached {
+    int32_t low[LANES];
+    float first[LANES], second[LANES];
+} reached;
+
+static inline void find_reached(const float *distance, const float *weight, size_t stride,
+                                const uint32_t *neighbor, size_t n, size_t bumps, reached *out)
+{
+    const vector one = fill(1.0f), zero = fill(0.0f);
+    const vector t = times(load(distance), fill((float)bumps));
+    const vector low = whole(smaller(t, fill((float)(bumps - 1))));
+    const vector f = minus(t, low), g = minus(f, one);
+    const vector u = larger(minus(one, times(f, f)), zero);
+    const vector v = larger(minus(one, times(g, g)), zero);
+    float scale[LANES];
+    for (size_t l = 0; l < LANES; l++)
+        scale[l] = weight ? weight[neighbor[l < n ? l : 0] * stride] : 1.0f;
+    store_whole(out->low, low);
+    store(out->first, times(times(u, u), load(scale)));
+    store(out->second, times(times(v, v), load(scale)));
+}
+
+/* The numbers of eight pairs: 1, direction, speed of approach, and the vector of the neighbour. */
+static inline void pair_numbers(const ascc_pairs *pairs, size_t i, const uint32_t *neighbor,
+                                size_t n, const float *feature, size_t a, const float own[3],
+                                int wall, size_t dimension, vector q[LANES])
+{
+    vector v[LANES];
+    for (size_t l = 0; l < LANES; l++)
+        v[l] = load(feature + (size_t)neighbor[i + (l < n ? l : 0)] * a);
+    transpose_lanes(v);
+    if (dimension < 3)
+        v[2] = fill(0.0f);
+    vector relative[3];
+    for (size_t c = 0; c < 3; c++) {
+        relative[c] = minus(wall ? fill(0.0f) : v[c], fill(own[c]));
+        v[c] = wall ? v[c] : relative[c];
+    }
+    q[0] = fill(1.0f);
+    q[1] = load(pairs->x + i);
+    q[2] = load(pairs->y + i);
+    q[3] = load(pairs->z + i);
+    q[4] = minus(fill(0.0f), add(add(times(q[1], relative[0]), times(q[2], relative[1])),
+                                 times(q[3], relative[2])));
+    q[5] = v[0];
+    q[6] = v[1];
+    q[7] = v[2];
+    transpose_lanes(q);
+}
+
+static void moments(const ascc_pairs *pairs, const uint32_t *neighbor, size_t k,
+                    const float *feature, size_t a, const float own[3], int wall, size_t dimension,
+                    const float *weight, size_t stride, size_t bumps, float *sum)
+{
+    memset(sum, 0, bumps * LANES * sizeof *sum);
+    for (size_t i = 0; i < k; i += LANES) {
+        const size_t n = k - i < LANES ? k - i : LANES;
+        vector q[LANES];
+        reached r;
+        pair_numbers(pairs, i, neighbor, n, feature, a, own, wall, dimension, q);
+        find_reached(pairs->distance + i, weight, stride, neighbor + i, n, bumps, &r);
+        for (size_t l = 0; l < n; l++) {
+            float *to = sum + (size_t)r.low[l] * LANES;
+            store(to, fused(fill(r.first[l]), q[l], load(to)));
+            to += LANES;
+            if ((size_t)r.low[l] + 1 < bumps)
+                store(to, fused(fill(r.second[l]), q[l], load(to)));
+        }
+    }
+}
+
 /* out[rows][vectors * 8] += in * weight with all sums in registers. */
 #define TILE(name, rows, vectors)                                                                  \
     static void name(const float *RESTRICT in, size_t in_stride, size_t a,                         \
@@ -686,6 +758,7 @@ void ASCC_VARIANT(ascc_kernels *kernels)
     kernels->basis = basis;
     kernels->gather_basis = gather_basis;
     kernels->pair_strengths = pair_strengths;
+    kernels->moments = moments;
     kernels->multiply = multiply;
     kernels->pair_terms = pair_terms;
     kernels->pair_impulses = pair_impulses;

@@ -71,6 +71,15 @@ typedef struct ascc_kernels {
     void (*pair_strengths)(const float *distance, const uint32_t *neighbor, size_t k,
                            const float *center, const float *feature, size_t bumps, float *out);
 
+    /* sum[bump][8] = sum over the pairs j < k in order of weight * bump (as in basis, of the distance) * the
+     * eight numbers 1, x, y, z, w, d[3]. fluid: d = feature[neighbor[j]] - own; wall: d =
+     * feature[neighbor[j]]; w, the speed of approach, is -(d . xyz), of a wall own . xyz. One chain of
+     * fma a bump. feature rows are a >= 8 apart, of which `dimension` numbers are read (but 8 are loaded);
+     * weight[neighbor[j] * stride], NULL = 1. With 2 dimensions z and d[2] are 0. */
+    void (*moments)(const ascc_pairs *pairs, const uint32_t *neighbor, size_t k,
+                    const float *feature, size_t a, const float own[3], int wall, size_t dimension,
+                    const float *weight, size_t stride, size_t bumps, float *sum);
+
     /* out[j][b] = window * sum over a of (center[a] + feature[neighbor[j]][a]) * kernel(j)[b][a],
      * kernel(j) = sum over c of trilinear weight * weight[c][b][a], for each pair j < k on its own.
      * 8 partial sums by a mod 8; b <= 3 is not filled up here; out is [k][4], the rest zeros. */

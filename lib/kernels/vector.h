@@ -263,6 +263,37 @@ static inline size_t store_positive(uint32_t *p, uint32_t first, vector a)
 }
 #endif
 
+/* Eight rows of eight become eight columns, in place. */
+static inline void transpose_lanes(vector a[LANES])
+{
+#if defined(ASCC_USE_AVX2)
+    vector b[LANES], c[LANES];
+    for (int i = 0; i < 4; i++) {
+        b[2 * i] = _mm256_unpacklo_ps(a[2 * i], a[2 * i + 1]);
+        b[2 * i + 1] = _mm256_unpackhi_ps(a[2 * i], a[2 * i + 1]);
+    }
+    for (int i = 0; i < 2; i++) {
+        c[4 * i] = _mm256_shuffle_ps(b[4 * i], b[4 * i + 2], _MM_SHUFFLE(1, 0, 1, 0));
+        c[4 * i + 1] = _mm256_shuffle_ps(b[4 * i], b[4 * i + 2], _MM_SHUFFLE(3, 2, 3, 2));
+        c[4 * i + 2] = _mm256_shuffle_ps(b[4 * i + 1], b[4 * i + 3], _MM_SHUFFLE(1, 0, 1, 0));
+        c[4 * i + 3] = _mm256_shuffle_ps(b[4 * i + 1], b[4 * i + 3], _MM_SHUFFLE(3, 2, 3, 2));
+    }
+    for (int i = 0; i < 4; i++) {
+        a[i] = _mm256_permute2f128_ps(c[i], c[4 + i], 0x20);
+        a[4 + i] = _mm256_permute2f128_ps(c[i], c[4 + i], 0x31);
+    }
+#else
+    float from[LANES][LANES], to[LANES][LANES];
+    for (int i = 0; i < LANES; i++)
+        store(from[i], a[i]);
+    for (int i = 0; i < LANES; i++)
+        for (int j = 0; j < LANES; j++)
+            to[j][i] = from[i][j];
+    for (int i = 0; i < LANES; i++)
+        a[i] = load(to[i]);
+#endif
+}
+
 /* The sum of the lanes, always in this order: ((0 + 4) + (2 + 6)) + ((1 + 5) + (3 + 7)). */
 static inline float total(vector a)
 {

@@ -58,8 +58,8 @@ typedef struct ascc_operation {
 
     /* ---- Lengths, sizes, cost ---- */
 
-    /* Neighbour lists for rows of `set`; returns how many. NULL: it reads rows that its source's set
-     * shares with its own. */
+    /* Neighbour lists for rows of `set`; returns how many. The first leads to rows of its source, a second
+     * to walls and their features. NULL: it reads rows that its source's set shares with its own. */
     int (*lists)(const ascc_plan *plan, const ascc_term *term, int32_t set,
                  ascc_list_key key[ASCC_MAX_LISTS]);
     /* Floats of all tensors as kernels read them: channels filled up to multiples of 8 with zeros. */

@@ -53,6 +53,8 @@ static void prepare_term(ascc_network *network, int32_t t, int32_t set)
     network->wants[term->source] |= term->rectify ? ASCC_WANTS_RECTIFIED : ASCC_WANTS_RAW;
     if (operation->reads_features && operation->reads_features(term))
         network->wants[0] |= ASCC_WANTS_RAW;
+    if (lists > 1)
+        network->wants[1] |= ASCC_WANTS_RAW;
 }
 
 ascc_status ascc_network_create(ascc_network *network, const ascc_allocator *allocator,
@@ -245,7 +247,7 @@ static ascc_status demand_term(ascc_network_run *run, const ascc_layer *layer, i
     uint8_t *reads = run->value[source].active;
     ascc_status status = ASCC_OK;
     for (int i = 0; i < ASCC_MAX_LISTS && status == ASCC_OK && key[i] >= 0; i++)
-        status = demand_rows(run, key[i], active, reads);
+        status = demand_rows(run, key[i], active, i ? run->value[1].active : reads);
     if (key[0] >= 0)
         return status;
     const int32_t set = ascc_network_set(run->network, source);

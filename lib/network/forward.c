@@ -67,10 +67,10 @@ static void compute_tiles(void *data, size_t begin, size_t end, int32_t slot)
     }
 }
 
-/* Room for a value as its readers want it. */
+/* Room for a value as its readers want it; kernels may load eight numbers from any in a row. */
 static bool take_value(ascc_network_run *run, int32_t v)
 {
-    const size_t rows = run->hierarchy->set[ascc_network_set(run->network, v)].count;
+    const size_t rows = run->hierarchy->set[ascc_network_set(run->network, v)].count + 1;
     const size_t channels = ascc_padded(ascc_network_channels(run->network, v));
     ascc_value *value = &run->value[v];
     if (run->network->wants[v] & ASCC_WANTS_RAW) {

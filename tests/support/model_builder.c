@@ -337,6 +337,27 @@ static void add_dense(random_network *n, const char *name, const char *source, i
     add_weights(&n->builder, &n->state, name, n->o.dimension, 0, in, out, n->o.gain);
 }
 
+/* Moments of fluid and walls, and the first layer that reads them. */
+static void add_moments(random_network *n)
+{
+    const int d = n->o.dimension, quarter = n->o.channels / 4;
+    const int sums = (2 + 2 * d) * (2 * n->o.moments + 1), in = 1 + 2 * d + (n->o.gravity ? d : 0);
+    model_text_add(
+        &n->text,
+        "{\"name\":\"sums\",\"points\":\"fluid\",\"channels\":%d,\"terms\":["
+        "{\"type\":\"moments\",\"source\":\"fluid\",\"radius\":%s,"
+        "\"basis\":{\"bumps\":%d},\"walls\":{\"radius\":%s,\"basis\":{\"bumps\":%d}}}]},",
+        sums, model_number(n->o.radius * n->o.spacing), n->o.moments,
+        model_number(1.2 * n->o.radius * n->o.spacing), n->o.moments + 1);
+    model_text_add(&n->text, "{\"name\":\"l0.0\",\"points\":\"fluid\",\"channels\":%d,\"terms\":[",
+                   n->o.channels);
+    n->terms = 0;
+    add_dense(n, "dense_sums", "sums", 0, 0, sums, 2 * quarter);
+    add_dense(n, "dense_fluid", "fluid", 0, 2 * quarter, n->o.motion == 2 ? in - d : in,
+              2 * quarter);
+    model_text_add(&n->text, "]}");
+}
+
 static void add_first_layer(random_network *n)
 {
     const int d = n->o.dimension, quarter = n->o.channels / 4;
@@ -499,7 +520,10 @@ static unsigned char *random_file(const model_random *options, const char *netwo
     n.builder.coarse = o->coarse;
     add_head(&n);
     model_text_add(&n.text, ",\"layers\":[");
-    add_first_layer(&n);
+    if (o->moments)
+        add_moments(&n);
+    else
+        add_first_layer(&n);
     for (int layer = 1; layer <= o->trunk_layers; layer++)
         add_trunk_layer(&n, layer);
     add_output(&n);

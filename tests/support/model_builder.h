@@ -83,6 +83,7 @@ typedef struct model_random {
     int walls;      /* 1: the last layer acts on walls, with one bump more; bumps, fluid_only */
     double limit;   /* of what a pair gives, spacings; bumps; 0 = none */
     double contact; /* with walls, spacings; 0 = none */
+    int moments; /* bumps of a first layer of pair moments, walls with one more; fluid_only, motion; 0 = none */
     int direction;  /* 1: the last layer's pairs act along their present line; bumps, fluid_only */
 } model_random;
 

@@ -466,6 +466,39 @@ static void convolve(const network_state *n, const ascc_layer *layer, const ascc
     free(factor);
 }
 
+/* Pair moments over one list: fluid, or (wall) the boundary. */
+static double *add_moments_of(const network_state *n, bool wall, double radius, int bumps,
+                              size_t row, double *out)
+{
+    const ascc_plan *plan = &n->o->model->plan;
+    const point_set *set = &n->sets->set[wall ? ASCC_SET_BOUNDARY : ASCC_SET_FLUID];
+    const point *query = &n->sets->set[ASCC_SET_FLUID].point[row];
+    const int d = plan->dimension;
+    const int32_t normal = plan->boundary_features[0] == ASCC_FEATURE_ONE ? 1 : 0;
+    for (size_t j = 0; j < set->count; j++) {
+        double r[3], q[8] = {1.0}, relative[3];
+        const double length = displacement(&set->point[j], query, r);
+        for (int c = 0; c < d; c++) {
+            const double u = length > 0.0 ? r[c] / length : 0.0;
+            const double other = wall ? read_value(n, 1, false, j, normal + c) : motion_of(n, j, c);
+            relative[c] = (wall ? 0.0 : other) - motion_of(n, row, c);
+            q[1 + c] = u;
+            q[1 + d] -= u * relative[c];
+            q[2 + d + c] = wall ? other : relative[c];
+        }
+        for (int k = 0; length < radius && k < bumps; k++)
+            for (int m = 0; m < 2 + 2 * d; m++)
+                out[k * (2 + 2 * d) + m] += bump_at(bumps, k, length / radius) * q[m];
+    }
+    return out + bumps * (2 + 2 * d);
+}
+
+static void add_moments(const network_state *n, const ascc_term *term, size_t row, double *out)
+{
+    out = add_moments_of(n, false, term->filter.radius, term->filter.bumps, row, out);
+    add_moments_of(n, true, term->option[1], (int)term->option[0], row, out);
+}
+
 static void transfer(const network_state *n, const ascc_layer *layer, const ascc_term *term,
                      size_t row, double *out)
 {
@@ -510,6 +543,8 @@ static void add_term(const network_state *n, const ascc_layer *layer, const ascc
         return;
     if (term->operation == &ascc_op_grid || term->operation == &ascc_op_basis) {
         convolve(n, layer, term, row, out);
+    } else if (term->operation == &ascc_op_moments) {
+        add_moments(n, term, row, out);
     } else if (term->operation == &ascc_op_transfer) {
         transfer(n, layer, term, row, out);
     } else {

@@ -1,0 +1,287 @@
+/* Pair moments: sums over neighbours of a radial basis times what is known of a pair, without weights
+ * (the first convolution of order 1 with its matrix taken out of the sum: a dense layer follows).
+ * SPDX-License-Identifier: MIT
+ *
+ * Of a fluid pair: 1, the unit vector to the neighbour, the speed of approach, the difference of velocities;
+ * of a wall: 1, the unit vector, the speed of approach, its normal. Galilean invariant by construction.
+ * Channels: [bump][number] of the fluid, then of walls. A particle is a neighbour of its own, at no distance.
+ */
+#include <math.h>
+
+#include "column.h"
+#include "model/cost.h"
+#include "model/filter.h"
+
+/* Of the walls' list; no bumps, no walls. */
+enum { OPTION_WALL_BUMPS = 0, OPTION_WALL_RADIUS = 1 };
+
+static int32_t wall_bumps(const ascc_term *term)
+{
+    return (int32_t)term->option[OPTION_WALL_BUMPS];
+}
+
+/* Numbers of a pair. */
+static int32_t numbers(const ascc_plan *plan)
+{
+    return 2 + 2 * plan->dimension;
+}
+
+/* First channel of the normals of walls, -1 = none. */
+static int32_t normal_channel(const ascc_plan *plan)
+{
+    int32_t channel = 0;
+    for (int32_t i = 0; i < plan->boundary_feature_count; i++) {
+        if (plan->boundary_features[i] == ASCC_FEATURE_NORMAL)
+            return channel;
+        channel += plan->boundary_features[i] == ASCC_FEATURE_ONE ? 1 : plan->dimension;
+    }
+    return -1;
+}
+
+static void read_moments(ascc_reader *reader, uint32_t object, const ascc_plan *plan,
+                         ascc_term *term, const char *name[ASCC_MAX_TENSORS])
+{
+    (void)plan;
+    (void)name;
+    ascc_filter_read_basis(reader, object, &term->filter, true);
+    if (!ascc_reader_has(reader, object, "walls"))
+        return;
+    ascc_filter walls = {.radius = 0.0};
+    const uint32_t inside = ascc_reader_object(reader, object, "walls");
+    if (reader->status == ASCC_OK)
+        ascc_filter_read_basis(reader, inside, &walls, true);
+    ascc_reader_end(reader, inside);
+    term->option[OPTION_WALL_BUMPS] = walls.bumps;
+    term->option[OPTION_WALL_RADIUS] = walls.radius;
+}
+
+#define FAIL(...) ascc_fail(builder->message, ASCC_ERROR_FORMAT, __VA_ARGS__)
+
+static ascc_status check(ascc_plan_builder *builder, const ascc_layer *layer,
+                         ascc_term_entry *entry, const char *const name[ASCC_MAX_TENSORS])
+{
+    (void)name;
+    const ascc_plan *plan = &builder->plan;
+    ascc_term *term = &entry->term;
+    const ascc_quoted quoted = ascc_quote(layer->name);
+    if (term->source != 0 || layer->set != ASCC_SET_FLUID || term->rectify ||
+        ascc_plan_motion(plan, 0) < 0)
+        return FAIL("layer '%s': 'moments' are of 'fluid' with the feature 'motion', without "
+                    "'relu', on the points 'fluid'",
+                    quoted.text);
+    if (wall_bumps(term) && normal_channel(plan) < 0)
+        return FAIL("layer '%s': moments of 'walls' need the boundary's feature 'normal'",
+                    quoted.text);
+    if (term->filter.neighbor_limit)
+        return FAIL("layer '%s': moments have no 'neighbor_limit'", quoted.text);
+    ascc_status status = ascc_plan_check_filter(builder, &term->filter, quoted.text);
+    term->outputs = numbers(plan) * (term->filter.bumps + wall_bumps(term));
+    term->filter.cells[0] = 1;
+    term->filter.cells[1] = term->filter.bumps;
+    term->filter.cells[2] = 1;
+    term->filter.mapping = ASCC_MAPPING_DIRECTION;
+    term->filter.window = ASCC_WINDOW_NONE;
+    return status;
+}
+
+static int lists(const ascc_plan *plan, const ascc_term *term, int32_t set,
+                 ascc_list_key key[ASCC_MAX_LISTS])
+{
+    (void)plan;
+    (void)set;
+    key[0] = (ascc_list_key){
+        .query = ASCC_SET_FLUID, .source = ASCC_SET_FLUID, .radius = term->filter.radius};
+    key[1] = (ascc_list_key){.query = ASCC_SET_FLUID,
+                             .source = ASCC_SET_BOUNDARY,
+                             .radius = term->option[OPTION_WALL_RADIUS]};
+    return wall_bumps(term) ? 2 : 1;
+}
+
+/* Two bumps reach a pair. */
+static double cost(const ascc_plan *plan, const ascc_cost_counts *counts, int32_t set,
+                   const ascc_term *term)
+{
+    const double pairs = ascc_cost_neighbors(plan, counts, ASCC_SET_FLUID, term->filter.radius) +
+                         (wall_bumps(term) ? ascc_cost_neighbors(plan, counts, ASCC_SET_BOUNDARY,
+                                                                 term->option[OPTION_WALL_RADIUS])
+                                           : 0.0);
+    return ascc_cost_points(counts, set) * pairs * 2.0 * numbers(plan);
+}
+
+static void scratch(const ascc_plan *plan, const ascc_term *term, ascc_scratch_sizes *sizes)
+{
+    (void)plan;
+    (void)term;
+    sizes->scratch = ascc_max_size(sizes->scratch, ASCC_GEOMETRY_ARRAYS * sizes->room);
+}
+
+static bool always(const ascc_term *term)
+{
+    (void)term;
+    return true;
+}
+
+/* The term's filter, or that of its walls. */
+static ascc_filter filter_of(const ascc_term *term, int list)
+{
+    ascc_filter filter = term->filter;
+    if (list) {
+        filter.bumps = wall_bumps(term);
+        filter.radius = term->option[OPTION_WALL_RADIUS];
+    }
+    return filter;
+}
+
+/* What the second vector of a pair is read from: motion of the fluid, normals of walls. */
+static const float *vectors_of(const ascc_network_run *run, int list, size_t *stride)
+{
+    const ascc_plan *plan = run->plan;
+    *stride = ascc_padded(list ? plan->boundary_channels : plan->fluid_channels);
+    return run->value[list].raw + (list ? normal_channel(plan) : ascc_plan_motion(plan, 0));
+}
+
+/* Moments of one row over one list, [bump][8]. */
+static void sum_row(const ascc_tile *tile, const ascc_term *term, int list, size_t row, float *sum)
+{
+    const ascc_network_run *run = tile->run;
+    const ascc_rows *rows = ascc_term_list(run, term, list);
+    const ascc_filter filter = filter_of(term, list);
+    const uint32_t *neighbor = rows->neighbor + rows->start[row];
+    const size_t count = rows->count[row], d = (size_t)run->plan->dimension;
+    size_t stride, own_stride;
+    const float *vectors = vectors_of(run, list, &stride);
+    const float *motion = vectors_of(run, 0, &own_stride) + row * own_stride;
+    const float own[3] = {motion[0], motion[1], d > 2 ? motion[2] : 0.0f};
+    const ascc_geometry g =
+        ascc_geometry_of(run, rows, &filter, row, neighbor, count, tile->scratch, tile->room);
+    run->tools->kernels->moments(&g.pairs, neighbor, count, vectors, stride, own, list, d, NULL, 0,
+                                 (size_t)filter.bumps, sum);
+}
+
+/* The numbers of a bump without those that a plane does not have. */
+static float *write_bump(const float from[8], int32_t dimension, float *to)
+{
+    for (int n = 0; n < 8; n++)
+        if (dimension == 3 || (n != 3 && n != 7))
+            *to++ += from[n];
+    return to;
+}
+
+static void forward(const ascc_tile *tile, const ascc_term *term)
+{
+    const int32_t dimension = tile->run->plan->dimension;
+    for (size_t r = 0; r < tile->n; r++) {
+        float *to = tile->sum + r * tile->width + term->column;
+        for (int list = 0; list < (wall_bumps(term) ? 2 : 1); list++) {
+            float sum[ASCC_MAX_BUMPS * 8];
+            const int32_t bumps = list ? wall_bumps(term) : term->filter.bumps;
+            sum_row(tile, term, list, tile->list[r], sum);
+            for (int32_t b = 0; b < bumps; b++)
+                to = write_bump(sum + b * 8, dimension, to);
+        }
+    }
+}
+
+/* ---- The way back: with gradients of positions only ---- */
+
+/* What a pair's bumps and numbers give, against the gradient of a row's moments. */
+typedef struct pair_gradient {
+    double by_rho, by_number[8]; /* numbers as in kernels.h */
+} pair_gradient;
+
+/* Reads the gradient of a bump's number; there are fewer in a plane. */
+static double gradient_at(const float *gradient, int32_t dimension, int32_t bump, int number)
+{
+    if (dimension == 3)
+        return (double)gradient[bump * 8 + number];
+    return number == 3 || number == 7 ? 0.0
+                                      : (double)gradient[bump * 6 + number - (number > 3 ? 1 : 0)];
+}
+
+static pair_gradient gradient_of_pair(const float *gradient, int32_t dimension, int32_t bumps,
+                                      double rho, const double q[8])
+{
+    pair_gradient g = {0.0, {0.0}};
+    for (int32_t b = 0; b < bumps; b++) {
+        const double t = bumps * rho - b, u = 1.0 - t * t;
+        if (u <= 0.0)
+            continue;
+        for (int n = 0; n < 8; n++) {
+            const double e = gradient_at(gradient, dimension, b, n);
+            g.by_rho += e * q[n] * -4.0 * t * u * bumps;
+            g.by_number[n] += e * u * u;
+        }
+    }
+    return g;
+}
+
+static void backward_pair(const ascc_reverse *pass, const ascc_term *term, int list, size_t row,
+                          size_t j, const float *gradient)
+{
+    const ascc_network_run *run = pass->run;
+    const ascc_rows *rows = ascc_term_list(run, term, list);
+    const ascc_filter filter = filter_of(term, list);
+    const int32_t d = run->plan->dimension;
+    size_t stride, own_stride;
+    const float *vectors = vectors_of(run, list, &stride) + j * stride;
+    const float *own = vectors_of(run, 0, &own_stride) + row * own_stride;
+    double r[3], u[3] = {0.0, 0.0, 0.0}, relative[3] = {0.0, 0.0, 0.0}, q[8] = {1.0};
+    ascc_seen_displacement(run, rows, row, j, r);
+    const double distance = sqrt(r[0] * r[0] + r[1] * r[1] + r[2] * r[2]);
+    for (int32_t c = 0; c < d; c++) {
+        u[c] = distance > 0.0 ? r[c] / distance : 0.0;
+        relative[c] = (list ? 0.0 : (double)vectors[c]) - (double)own[c];
+        q[1 + c] = u[c];
+        q[4] -= u[c] * relative[c];
+        q[5 + c] = list ? (double)vectors[c] : relative[c];
+    }
+    const pair_gradient g =
+        gradient_of_pair(gradient, d, filter.bumps, distance / filter.radius, q);
+    double by_u[3] = {0.0, 0.0, 0.0}, along = 0.0, by_r[3] = {0.0, 0.0, 0.0}, back[3];
+    float *motion = pass->value[0].raw ? pass->value[0].raw + ascc_plan_motion(run->plan, 0) : NULL;
+    for (int32_t c = 0; c < d; c++) {
+        by_u[c] = g.by_number[1 + c] - g.by_number[4] * relative[c];
+        along += by_u[c] * u[c];
+        const float by_relative =
+            (float)((list ? 0.0 : g.by_number[5 + c]) - g.by_number[4] * u[c]);
+        if (motion)
+            motion[row * own_stride + (size_t)c] -= by_relative;
+        if (motion && !list)
+            motion[j * own_stride + (size_t)c] += by_relative;
+    }
+    for (int c = 0; c < 3; c++) {
+        if (distance > 0.0)
+            by_r[c] = g.by_rho * u[c] / filter.radius + (by_u[c] - along * u[c]) / distance;
+        back[c] = -by_r[c];
+    }
+    ascc_reverse_place(pass, list ? ASCC_SET_BOUNDARY : ASCC_SET_FLUID, j, by_r);
+    ascc_reverse_place(pass, ASCC_SET_FLUID, row, back);
+}
+
+static void backward(const ascc_reverse *pass, const ascc_layer *layer, const ascc_term *term,
+                     const uint32_t *list, size_t n)
+{
+    (void)layer;
+    const size_t b = ascc_padded(term->outputs);
+    const size_t walls = (size_t)(term->filter.bumps * numbers(pass->run->plan));
+    for (size_t r = 0; pass->pass->seen && r < n; r++)
+        for (int l = 0; l < (wall_bumps(term) ? 2 : 1); l++) {
+            const ascc_rows *rows = ascc_term_list(pass->run, term, l);
+            const uint32_t *neighbor = rows->neighbor + rows->start[list[r]];
+            for (size_t k = 0; k < rows->count[list[r]]; k++)
+                if (l || neighbor[k] != list[r])
+                    backward_pair(pass, term, l, list[r], neighbor[k],
+                                  pass->tile + r * b + (l ? walls : 0));
+        }
+}
+
+const ascc_operation ascc_op_moments = {.name = "pair moments",
+                                        .type = "moments",
+                                        .read = read_moments,
+                                        .check = check,
+                                        .lists = lists,
+                                        .cost = cost,
+                                        .scratch = scratch,
+                                        .reads_features = always,
+                                        .forward = forward,
+                                        .backward = backward};
