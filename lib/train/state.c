@@ -162,7 +162,7 @@ static ascc_status read_arrays(ascc_trainer *t, const char *path, const ascc_saf
 /* Everything is read and checked before anything changes. */
 static ascc_status read_state(ascc_trainer *t, const char *path, ascc_safetensors *file)
 {
-    uint64_t iteration;
+    uint64_t iteration = 0;
     ascc_status status = check_metadata(t, path, file, &iteration);
     if (status != ASCC_OK)
         return status;
