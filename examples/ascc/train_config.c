@@ -56,11 +56,22 @@ static void text_of(ascc_reader *r, uint32_t object, const char *key, char *into
 
 /* ---- Paths ---------------------------------------------------------------------------------------- */
 
+static bool has_controls(const char *path)
+{
+    for (; *path; path++)
+        if ((unsigned char)*path < 0x20 || *path == 0x7f)
+            return true;
+    return false;
+}
+
 static void join(reading *g, const char *path, char into[ASCC_TRAIN_PATH])
 {
     const char *folder = path[0] == '/' ? "" : g->folder;
     if (!path[0])
         ascc_reader_fail(&g->r, "a path is empty");
+    else if (has_controls(
+                 path)) /* a program that is told of the file would read on in a new line */
+        ascc_reader_fail(&g->r, "a path holds a control character");
     else if (strlen(folder) + strlen(path) + 32 > ASCC_TRAIN_PATH)
         ascc_reader_fail(&g->r, "a path is too long");
     else
