@@ -188,7 +188,8 @@ static void read_coarse(ascc_reader *r, uint32_t o, ascc_architecture *a)
     a->levels = integer_or(r, o, "levels", 0, ASCC_ARCHITECTURE_LEVELS, 0);
     a->coarse_layers = integer_or(r, o, "coarse_layers", 1, 16, a->coarse_layers);
     if (a->levels || ascc_reader_has(r, o, "coarse_channels"))
-        ascc_reader_numbers(r, o, "coarse_channels", a->levels, 1.0, ASCC_ARCHITECTURE_CHANNELS, channels);
+        ascc_reader_numbers(r, o, "coarse_channels", a->levels, 1.0, ASCC_ARCHITECTURE_CHANNELS,
+                            channels);
     for (int32_t i = 0; i < a->levels; i++)
         a->coarse_channels[i] = (int32_t)channels[i];
 }
