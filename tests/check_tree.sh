@@ -26,7 +26,7 @@ code() {
     done
 }
 
-libc='assert|errno|float|immintrin|inttypes|limits|malloc|math|pthread|stdalign|stdarg|stdatomic|stdbool|stddef|stdint|stdio|stdlib|string|time|unistd|arm_neon|sched'
+libc='assert|errno|fcntl|float|immintrin|inttypes|limits|malloc|math|pthread|stdalign|stdarg|stdatomic|stdbool|stddef|stdint|stdio|stdlib|string|sys/stat|time|unistd|windows|arm_neon|sched'
 kernels=$(cd lib/kernels && echo *.h | sed 's/\.h//g; s/ /|/g')
 sources=$(find lib -name '*.c' -o -name '*.h' | sort)
 

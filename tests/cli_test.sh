@@ -2,6 +2,7 @@
 # The ascc program from outside: arguments, files, pictures, interruption; prints TAP.
 # $1: a build folder. SPDX-License-Identifier: MIT
 cd "$(dirname "$0")/.." || exit 1
+root=$(pwd)
 ascc=$(cd "${1:-build}" && pwd)/examples/ascc || exit 1
 number=0
 failed=0
@@ -93,7 +94,7 @@ done
 run sim demo dam-break-2d --size 8 -n 20 --every 10 -o a.safetensors --frames png --ply ply
 report $? 'the demonstration model runs in 2D'
 holds 'the table has particles, phases and energy' sh -c '
-    grep -q "^particles  *32 fluid" out && grep -q "^  last layer .* ms a step" out &&
+    grep -q "^particles  *32 fluid" out && grep -q "^  pairs .* ms a step" out &&
         grep -q "^energy " out'
 holds 'the momentum error is exactly zero' grep -q '^momentum error  *0  (0 0 0 quanta' out
 holds 'and says why angular momentum is not measured' grep -q '^angular mom. error  *not measured' out
@@ -151,6 +152,162 @@ status=$?
 [ $status -eq 130 ] && grep -q 'interrupted after' err && [ -f e.safetensors ]
 report $? 'an interrupted run says so and ends with status 130'
 holds 'and its file is whole' "$ascc" info e.safetensors
+
+# ---- Outputs: whole files, or told before the run ----
+
+# Far more steps than there is time for: what is refused here is refused before the run.
+long='sim demo dam-break-2d --size 6 -n 100000000 --every 100000000'
+# early TEXT ARGUMENTS...: is refused at once.
+early() {
+    text=$1
+    shift
+    timeout 20 "$ascc" "$@" >out 2>err
+    [ $? -eq 1 ] && grep -qF -e "$text" err && [ ! -s out ]
+    report $? "ascc $* is refused before the run: $text"
+}
+mkdir odd
+mkfifo odd/fifo
+mkdir odd/folder
+echo text >odd/file
+# One of our own, never the system's: who fails here would replace it.
+mknod odd/node c 1 3 2>/dev/null || mkfifo odd/node
+# shellcheck disable=SC2086
+for target in fifo node; do
+    early "odd/$target: cannot be written: it is no regular file" $long -o odd/$target
+    for option in json csv; do
+        early "odd/$target: cannot be written: it is no regular file" \
+            eval ballistic a.safetensors --$option odd/$target
+    done
+done
+# shellcheck disable=SC2086
+{
+    early "odd/folder: cannot be written: Is a directory" $long -o odd/folder
+    early "odd/file: Not a directory" $long --frames odd/file
+    early "odd/fifo: Not a directory" $long --ply odd/fifo
+}
+early "odd/folder: cannot be written: Is a directory" eval ballistic a.safetensors --json odd/folder
+early "odd/file: Not a directory" show a.safetensors -o odd/file
+early "odd/fifo: Not a directory" show a.safetensors -o odd/fifo
+early "odd/file: Not a directory" generate wbc2d -o odd/file
+mkdir odd/frames
+mkfifo odd/frames/frame_00000.png odd/frames/frame_00000.ply
+early "frame_00000.png: cannot be written: it is no regular file" show a.safetensors -o odd/frames
+# shellcheck disable=SC2086
+early "frame_00000.ply: cannot be written: it is no regular file" $long --ply odd/frames
+holds 'what stood there stands there' sh -c '
+    [ -p odd/fifo ] && { [ -c odd/node ] || [ -p odd/node ]; } && [ -d odd/folder ] && [ "$(cat odd/file)" = text ] &&
+        [ -p odd/frames/frame_00000.png ] && [ "$(ls odd/frames | wc -l)" -eq 2 ]'
+
+ln -s real.safetensors odd/link
+ln -s ../real.json odd/link.json
+run sim demo dam-break-2d --size 8 -n 20 --every 10 -o odd/link
+report $? 'a sequence is written through a link'
+holds 'to where it leads' sh -c '[ -L odd/link ] && cmp odd/real.safetensors a.safetensors'
+run eval ballistic a.safetensors --json odd/link.json --csv odd/new.csv --no-rollout
+report $? 'so are reports'
+holds 'to where they lead' sh -c '[ -L odd/link.json ] && grep -q runs real.json && grep -q figure odd/new.csv'
+chmod 604 real.json
+run eval ballistic a.safetensors --json real.json --no-rollout --quiet
+holds 'a file that is replaced keeps its mode' sh -c 'ls -l real.json | grep -q "^-rw----r--"'
+holds 'nothing is left beside' sh -c '[ -z "$(ls odd . | grep part)" ]'
+(
+    trap '' XFSZ
+    ulimit -f 1
+    "$ascc" sim demo dam-break-2d --size 8 -n 20 -o a.safetensors >out 2>err ||
+        "$ascc" show a.safetensors -o shown >out 2>>err
+) 2>/dev/null
+holds 'a full disk is told' grep -q 'a.safetensors: cannot be written: File too large' err
+holds 'and leaves the old file as it was' cmp odd/real.safetensors a.safetensors
+holds 'and the old pictures' sh -c '
+    for f in shown/*; do
+        [ "$(tail -c 8 $f | od -An -tx1 | tr -d " ")" = 49454e44ae426082 ] || exit 1
+    done
+    [ -z "$(ls shown . | grep part)" ]'
+
+# ---- Standard output that is full or closed ----
+
+if [ -c /dev/full ] && ! echo x 2>/dev/null >/dev/full; then
+    for words in help version 'sim --help' 'info --help' 'info a.safetensors' 'lint a.safetensors' \
+        'eval --help' 'eval ballistic a.safetensors --no-rollout' 'generate --help' 'show --help' \
+        'train --help' 'sim demo dam-break-2d --size 6 -n 1'; do
+        # shellcheck disable=SC2086
+        "$ascc" $words >/dev/full 2>err
+        [ $? -eq 1 ] && grep -q '^ascc: standard output: No space left on device$' err
+        report $? "ascc $words tells that standard output is full"
+    done
+fi
+"$ascc" sim demo dam-break-2d --size 8 -n 20 --every 10 -o closed.safetensors >&- 2>err
+[ $? -eq 1 ] && grep -q '^ascc: standard output: ' err
+report $? 'closed standard output is told'
+holds 'and no file takes its place' cmp closed.safetensors a.safetensors
+
+# ---- Texts of files that a terminal would obey ----
+
+# harmless NAME ARGUMENTS...: what is printed holds no control character but the end of a line.
+harmless() {
+    name=$1
+    shift
+    run "$@"
+    cat out err | LC_ALL=C grep -q . && ! cat out err | tr -d '\n' | LC_ALL=C grep -q '[[:cntrl:]]' &&
+        ! cat out err | LC_ALL=C grep -q "$(printf '\302[\200-\237]\\|\342\200\256\\|^fake')"
+    report $? "$name"
+}
+escapes='\u001b]0;x\u0007\u001b[31m\u009b31m\u202e\r\nfake'
+# sequence FILE HEADER: a sequence file of one particle at rest.
+sequence() {
+    {
+        # shellcheck disable=SC2059
+        printf "\\$(printf %o $((${#2} % 256)))\\$(printf %o $((${#2} / 256)))\0\0\0\0\0\0"
+        printf %s "$2"
+        head -c 24 /dev/zero
+    } >"$1"
+}
+# header MASS SOURCE DTYPE: of such a file.
+header() {
+    printf %s '{"__metadata__":{"format":"ascc.sequence","version":"1","dim":"3","dt":"0.02",' \
+        '"particle_radius":"0.025","particle_mass":"'"$1"'","rest_density":"1000","gravity":"0 0 0",' \
+        '"source":"'"$2"'"},"fluid.position":{"dtype":"'"$3"'","shape":[1,1,3],"data_offsets":[0,12]},' \
+        '"fluid.velocity":{"dtype":"F32","shape":[1,1,3],"data_offsets":[12,24]},' \
+        '"boundary.position":{"dtype":"F32","shape":[0,3],"data_offsets":[24,24]},' \
+        '"boundary.normal":{"dtype":"F32","shape":[0,3],"data_offsets":[24,24]}}'
+}
+sequence escape.safetensors "$(header 0.125 "$escapes" F32)"
+harmless 'the source of a sequence is shown, not obeyed' info escape.safetensors
+holds 'all of it in one line' grep -q 'source .*31m.*fake$' out
+sequence type.safetensors "$(header 0.125 x "$escapes")"
+sequence mass.safetensors "$(header "$escapes" x F32)"
+for words in 'info' 'lint' 'sim demo -n 1' 'show -o shown' 'eval ballistic'; do
+    for file in type mass; do
+        # shellcheck disable=SC2086
+        harmless "ascc $words: a $file is quoted, not obeyed" $words $file.safetensors
+    done
+done
+# A name as long as the one that it replaces; the file is otherwise as it was.
+LC_ALL=C sed 's/water2d-tiny/\\\\u001b[31mX/' "$root/examples/models/water2d-tiny.safetensors" >escape.model
+harmless "a model's name is shown, not obeyed" info escape.model
+holds 'and the model is described' grep -q 'model ?.31mX$' out
+odd_name=$(printf 'a\033[31m\nfake')
+cp a.safetensors "$odd_name"
+harmless "a file's name is shown, not obeyed" info "$odd_name"
+harmless "a file's name in a table" eval ballistic "$odd_name" --no-rollout
+harmless 'a file that is not there' lint "$odd_name.none"
+harmless 'a command that is none' "$odd_name"
+printf '{"\033[31m\\u009b": 1}' >escape.json
+harmless 'a config' train escape.json
+printf '{"network": {"dimension": 2, "kernel": "\\u001b[31m\\u009b"}}' >escape.json
+harmless 'a word of a config' train escape.json
+
+# ---- Numbers that no scene has ----
+
+for mass in 1e308 1e-308 0 -1 nan; do
+    sequence huge.safetensors "$(header $mass x F32)"
+    for words in 'info' 'lint' 'sim demo -n 1' 'eval ballistic'; do
+        # shellcheck disable=SC2086
+        run $words huge.safetensors
+        [ $? -ne 0 ] && grep -q 'particle_mass = ' err
+        report $? "ascc $words refuses a mass of $mass by name"
+    done
+done
 
 if command -v script >/dev/null 2>&1; then
     script -qec "'$ascc' sim demo dam-break-3d -n 30" /dev/null >out 2>err </dev/null

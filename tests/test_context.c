@@ -86,6 +86,36 @@ static void a_message_is_one_line_that_fits(void **state)
     assert_string_equal(message.text, "again: path 'a?b?c' of 7");
 }
 
+static void a_message_holds_nothing_that_a_terminal_obeys(void **state)
+{
+    (void)state;
+    static const char *const texts[][2] = {
+        {"\x1b[31mred\x07", "?[31mred?"},
+        {"\xc2\x9b"
+         "31m",
+         "??31m"}, /* CSI in UTF-8 */
+        {"\x9b"
+         "31m",
+         "?31m"}, /* and as one byte */
+        {"a\xe2\x80\xae"
+         "b",
+         "a???b"}, /* right to left from here */
+        {"a\xe2\x80\xa8"
+         "b",
+         "a???b"},                         /* end of the line */
+        {"\xc0\x9b\xe0\x82\x9b", "?????"}, /* too long for what they mean */
+        {"\xed\xa0\x80\xf4\x90\x80\x80", "???????"},
+        {"cut \xe6\xb0", "cut ??"},
+        {"mod\xc3\xa8le \xe6\xb0\xb4 \xf0\x9f\x92\xa7",
+         "mod\xc3\xa8le \xe6\xb0\xb4 \xf0\x9f\x92\xa7"},
+    };
+    for (size_t i = 0; i < sizeof texts / sizeof *texts; i++) {
+        ascc_message message;
+        ascc_fail(&message, ASCC_ERROR_FILE, "%s", texts[i][0]);
+        assert_string_equal(message.text, texts[i][1]);
+    }
+}
+
 /* A struct as an older, this, and a newer program know it. */
 typedef struct old_thing {
     size_t size;
@@ -443,6 +473,7 @@ int main(void)
         cmocka_unit_test(every_status_has_a_text_of_its_own),
         cmocka_unit_test(the_library_has_the_version_of_its_header),
         cmocka_unit_test(a_message_is_one_line_that_fits),
+        cmocka_unit_test(a_message_holds_nothing_that_a_terminal_obeys),
         cmocka_unit_test(structs_of_other_sizes_are_read_as_far_as_known),
         cmocka_unit_test(structs_of_other_sizes_are_written_as_far_as_known),
         cmocka_unit_test(a_context_needs_no_options),

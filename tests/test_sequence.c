@@ -2,12 +2,16 @@
  * SPDX-License-Identifier: MIT */
 #include <math.h>
 #include <setjmp.h>
+#include <signal.h>
 #include <stdarg.h>
 #include <stddef.h>
 #include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/resource.h>
+#include <sys/stat.h>
+#include <sys/wait.h>
 #include <unistd.h>
 
 #include <cmocka.h>
@@ -134,26 +138,70 @@ static void test_a_dropped_file_leaves_the_old_one(void **state)
     ascc_sequence_free(&s);
 }
 
-/* /dev/full takes no byte: what did not reach the disk is never given the file's name. */
+/* Files of a few blocks at most: what did not reach the disk is never given the file's name. */
 static void test_a_full_disk_is_reported(void **state)
 {
     (void)state;
-    char error[256] = "", part[160];
-    (void)snprintf(part, sizeof part, "%s.part", path);
-    if (access("/dev/full", W_OK) != 0 || symlink("/dev/full", part) != 0)
-        skip();
+    char error[256] = "";
+    write_two_frames(true);
+    struct rlimit before, little;
+    assert_int_equal(getrlimit(RLIMIT_FSIZE, &before), 0);
+    little = before;
+    little.rlim_cur = 20000;
+    assert_int_equal(setrlimit(RLIMIT_FSIZE, &little), 0);
+    (void)signal(SIGXFSZ, SIG_IGN);
     const ascc_sequence header = header_2d(3);
     const float x[6] = {0};
     ascc_sequence_writer *writer = ascc_sequence_create(path, &header, true, error, sizeof error);
-    if (writer) {
-        bool good = true;
-        for (int t = 0; good && t < 100000; t++)
-            good = ascc_sequence_append(writer, x, x, error, sizeof error);
-        assert_false(good);
-        assert_false(ascc_sequence_finish(writer, true, error, sizeof error));
-    }
+    assert_non_null(writer);
+    bool good = true;
+    for (int t = 0; good && t < 100000; t++)
+        good = ascc_sequence_append(writer, x, x, error, sizeof error);
+    assert_false(good);
+    assert_false(ascc_sequence_finish(writer, true, error, sizeof error));
+    assert_int_equal(setrlimit(RLIMIT_FSIZE, &before), 0);
     assert_non_null(strstr(error, "cannot be written"));
-    assert_int_not_equal(access(path, F_OK), 0);
+    ascc_sequence s;
+    assert_true(ascc_sequence_read(path, &s, error, sizeof error));
+    assert_int_equal(s.frames, 2);
+    ascc_sequence_free(&s);
+}
+
+static void test_what_a_killed_program_left_is_no_hindrance(void **state)
+{
+    (void)state;
+    char part[160];
+    struct stat about;
+    (void)snprintf(part, sizeof part, "%s.part", path);
+    assert_int_equal(symlink("/dev/full", part), 0);
+    write_two_frames(true);
+    FILE *left = fopen(part, "wb");
+    assert_non_null(left);
+    assert_true(fputs("left behind", left) >= 0);
+    assert_int_equal(fclose(left), 0);
+    write_two_frames(true);
+    assert_int_not_equal(lstat(part, &about), 0);
+}
+
+static void test_two_programs_do_not_write_one_file(void **state)
+{
+    (void)state;
+    char error[256] = "";
+    const ascc_sequence header = header_2d(3);
+    ascc_sequence_writer *writer = ascc_sequence_create(path, &header, true, error, sizeof error);
+    assert_non_null(writer);
+    const pid_t other = fork();
+    if (other == 0) {
+        const bool refused = !ascc_sequence_create(path, &header, true, error, sizeof error) &&
+                             strstr(error, "another program is writing it");
+        _exit(refused ? 0 : 1);
+    }
+    int status = -1;
+    assert_int_equal(waitpid(other, &status, 0), other);
+    assert_int_equal(status, 0);
+    const float x[6] = {0};
+    assert_true(ascc_sequence_append(writer, x, x, error, sizeof error));
+    assert_true(ascc_sequence_finish(writer, true, error, sizeof error));
 }
 
 static void test_a_folder_that_is_not_there_is_reported(void **state)
@@ -227,6 +275,7 @@ static void test_a_malformed_header_is_refused_by_name(void **state)
         {"{}", "metadata format"},
         {"{\"__metadata__\":3}", "metadata format"},
         {"{\"__metadata__\":{\"format\":\"other\"}}", "'other', not 'ascc.sequence'"},
+        {"{\"__metadata__\":{\"format\":\"\\u001b[31m\\n\\u009b\"}}", "is '?[31m?"},
         {"{\"__metadata__\":{\"format\":\"ascc.sequence\"}}", "no version"},
         {"{\"__metadata__\":{\"format\":\"ascc.sequence\",\"version\":\"2\"}}", "no dim"},
         {"{\"__metadata__\":{\"format\":\"ascc.sequence\",\"version\":\"2\",\"dim\":\"2\"}}",
@@ -238,7 +287,7 @@ static void test_a_malformed_header_is_refused_by_name(void **state)
          "dt = 'nan'"},
         {"{\"__metadata__\":{\"format\":\"ascc.sequence\",\"version\":\"1\",\"dim\":\"2\","
          "\"dt\":\"-1\"}}",
-         "dt = -1 is not positive"},
+         "dt = -1 is not within"},
         {"{\"__metadata__\":{\"format\":\"ascc.sequence\",\"version\":\"1\",\"dim\":\"2\","
          "\"dt\":\"1 2\"}}",
          "dt = '1 2'"},
@@ -255,6 +304,37 @@ static void test_a_malformed_header_is_refused_by_name(void **state)
         write_raw(cases[i].header, strlen(cases[i].header), 48);
         expect_refusal(cases[i].expected);
     }
+}
+
+/* Each number of the metadata out of its range, in a file that is right in all else. */
+static void test_absurd_numbers_are_refused_by_name(void **state)
+{
+    (void)state;
+    static const char *const keys[] = {"dt", "particle_radius", "particle_mass", "rest_density",
+                                       "gravity"};
+    static const char *const wrong[][4] = {{"0", "-0.1", "1e308", "1e-308"},
+                                           {"0", "-0.1", "1e308", "1e-308"},
+                                           {"0", "-1", "1e308", "1e-308"},
+                                           {"0", "-1", "1e308", "1e-308"},
+                                           {"0 1e308", "-1e7 0", "0 inf", "nan 0"}};
+    for (size_t k = 0; k < 5; k++)
+        for (size_t i = 0; i < 4; i++) {
+            char header[1024], expected[64];
+            int length = snprintf(header, sizeof header,
+                                  "{\"__metadata__\":{\"format\":\"ascc.sequence\","
+                                  "\"version\":\"1\",\"dim\":\"2\"");
+            for (size_t j = 0; j < 5; j++)
+                length += snprintf(header + length, sizeof header - (size_t)length,
+                                   ",\"%s\":\"%s\"", keys[j],
+                                   j == k   ? wrong[k][i]
+                                   : j == 4 ? "0 -9.81"
+                                            : "1");
+            (void)snprintf(header + length, sizeof header - (size_t)length,
+                           "}," POSITION "," VELOCITY "," WALL "," NORMAL "}");
+            write_raw(header, strlen(header), 48);
+            (void)snprintf(expected, sizeof expected, "metadata %s = ", keys[k]);
+            expect_refusal(expected);
+        }
 }
 
 static void test_a_malformed_tensor_is_refused_by_name(void **state)
@@ -369,9 +449,12 @@ int main(void)
         TEST(test_an_empty_scene_is_read_again),
         TEST(test_a_dropped_file_leaves_the_old_one),
         TEST(test_a_full_disk_is_reported),
+        TEST(test_what_a_killed_program_left_is_no_hindrance),
+        TEST(test_two_programs_do_not_write_one_file),
         TEST(test_a_folder_that_is_not_there_is_reported),
         TEST(test_a_well_formed_header_is_accepted),
         TEST(test_a_malformed_header_is_refused_by_name),
+        TEST(test_absurd_numbers_are_refused_by_name),
         TEST(test_a_malformed_tensor_is_refused_by_name),
         TEST(test_a_header_longer_than_the_file_is_refused),
         TEST(test_every_cut_of_a_file_is_refused),

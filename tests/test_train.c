@@ -1,6 +1,7 @@
 /* The trainer's gradients against central differences of the oracle, and what it promises besides.
  * SPDX-License-Identifier: MIT */
 #include <ascc/train.h>
+#include <errno.h>
 #include <math.h>
 #include <unistd.h>
 
@@ -546,6 +547,45 @@ static void same_seed_gives_the_same_weights_for_any_threads(void **state)
     }
 }
 
+/* Allocations that still succeed; negative: all do. */
+static int allocations_until_failure = -1;
+
+int __real_posix_memalign(void **memory, size_t alignment, size_t size);
+int __wrap_posix_memalign(void **memory, size_t alignment, size_t size);
+
+int __wrap_posix_memalign(void **memory, size_t alignment, size_t size)
+{
+    if (allocations_until_failure == 0)
+        return ENOMEM;
+    if (allocations_until_failure > 0)
+        allocations_until_failure--;
+    return __real_posix_memalign(memory, alignment, size);
+}
+
+static void creation_without_memory_says_so(void **state)
+{
+    (void)state;
+    size_t size;
+    const model_random random = small(5, 2);
+    unsigned char *bytes = model_builder_random(&random, &size);
+    ascc_trainer_options o = augmented(1);
+    char message[256];
+    o.message = message;
+    o.message_size = sizeof message;
+    for (int n = 0; n < 6; n++) {
+        ascc_trainer *trainer = NULL;
+        message[0] = '\0';
+        allocations_until_failure = n;
+        const ascc_status status = ascc_trainer_create(&o, bytes, size, &trainer);
+        allocations_until_failure = -1;
+        assert_int_equal(status, ASCC_ERROR_MEMORY);
+        assert_null(trainer);
+        if (!strstr(message, "no memory"))
+            fail_msg("allocation %d: '%s'", n, message);
+    }
+    free(bytes);
+}
+
 static void going_on_from_a_saved_state_gives_the_same_bits(void **state)
 {
     (void)state;
@@ -895,6 +935,7 @@ int main(void)
         cmocka_unit_test(gradients_with_positions_as_constants_are_right),
         cmocka_unit_test(gradients_of_penalties_are_right),
         cmocka_unit_test(same_seed_gives_the_same_weights_for_any_threads),
+        cmocka_unit_test(creation_without_memory_says_so),
         cmocka_unit_test(going_on_from_a_saved_state_gives_the_same_bits),
         cmocka_unit_test(a_sequence_with_a_nan_is_refused_by_name),
         cmocka_unit_test(a_sequence_of_another_time_step_or_too_short_is_refused),

@@ -210,12 +210,44 @@ refuses 1 'nor any rollout of the 19 iterations before' train huge.json
 holds 'sequence and frame are named' grep -q 'iteration 21: sequence [0-9a-z_/.]*, frame [0-9]*: ' err
 holds 'the weights before are saved, and that is told' grep -q 'huge/m.checkpoint and huge/m.*hold iteration' err
 
+# ---- Outputs that cannot be: told before the work ----
+
+# A stage that never ends: what is refused is refused before it.
+mkdir odd
+mkfifo odd/fifo
+for change in 's|odd/m.safetensors|odd/fifo|' 's|"batch"|"log": "odd/fifo", "batch"|' \
+    's|"checkpoint": {|"checkpoint": {"path": "odd/fifo", |'; do
+    config odd.json odd "$change; s/\"iterations\": 12/\"iterations\": 900000000/"
+    timeout 20 "$ascc" train odd.json >out 2>err
+    [ $? -eq 1 ] && grep -q 'ascc train: odd/fifo: cannot be written: it is no regular file' err
+    report $? "no training for a FIFO: $change"
+done
+holds 'and is there still' [ -p odd/fifo ]
+wrong 'a path holds a control character' 's|"batch"|"log": "a\\nb.csv", "batch"|'
+# gnuplot runs what a path begins with after these; ours keeps what it is told.
+mkdir -p gnuplot
+printf '#!/bin/sh\ncat >>script\n' >gnuplot/gnuplot
+chmod +x gnuplot/gnuplot
+for first in '|' '<' -; do
+    config "told.json" told "s#\"batch\"#\"log\": \"${first}touch told.csv\", \"batch\"#"
+    rm -f told/* script
+    PATH=$folder/gnuplot:$PATH run train told.json --iterations 1
+    holds "gnuplot is given a file, not a command, where the log begins with $first" sh -c '
+        grep -qF "set output '"'./${first}touch told.svg'"'" script &&
+            grep -qF "plot '"'./${first}touch told.csv'"'" script'
+done
+
 # ---- A damaged checkpoint, a full disk ----
 
 config damaged.json damaged
 run train damaged.json --iterations 2
 head -c 300 damaged/m.checkpoint >cut && mv cut damaged/m.checkpoint
 refuses 1 'damaged/m.checkpoint: ' train damaged.json --resume
+# The last float of the second moments becomes NaN.
+rm -f damaged/m.checkpoint
+run train damaged.json --iterations 2
+head -c -4 damaged/m.checkpoint >nan && printf '\000\000\300\177' >>nan && mv nan damaged/m.checkpoint
+refuses 1 "tensor 'moment2' holds a value that is not finite" train damaged.json --resume
 
 config full.json full
 run train full.json --iterations 3

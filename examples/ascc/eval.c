@@ -9,7 +9,9 @@
 #include <string.h>
 
 #include "commands.h"
+#include "console.h"
 #include "evaluate.h"
+#include "new_file.h"
 
 enum { MOST_SEQUENCES = 256, COLUMNS = 5 };
 
@@ -94,7 +96,7 @@ static bool read_arguments(int argc, char **argv, options *o)
             o->measure.no_rollout = true;
         else if (strncmp(argv[i], "--", 2) == 0) {
             if (i + 1 == argc || !read_option(argv[i], argv[i + 1], o)) {
-                fprintf(stderr, "ascc eval: %s: unknown, or not with this value\n", argv[i]);
+                ascc_line(stderr, "ascc eval: %s: unknown, or not with this value", argv[i]);
                 return false;
             }
             i++;
@@ -124,15 +126,24 @@ static bool write_reports(const options *o, const ascc_report_run *runs)
     const size_t n = o->sequence_count;
     if (!o->quiet)
         ascc_report_table(stdout, o->method, runs, n, COLUMNS);
-    if (o->json && !ascc_report_json(o->json, o->method, runs, n)) {
-        fprintf(stderr, "ascc eval: cannot write %s\n", o->json);
-        return false;
-    }
-    if (o->csv && !ascc_report_csv(o->csv, o->method, runs, n)) {
-        fprintf(stderr, "ascc eval: cannot write %s\n", o->csv);
-        return false;
-    }
-    return true;
+    char error[512];
+    const bool good =
+        (!o->json || ascc_report_json(o->json, o->method, runs, n, error, sizeof error)) &&
+        (!o->csv || ascc_report_csv(o->csv, o->method, runs, n, error, sizeof error));
+    if (!good)
+        ascc_line(stderr, "ascc eval: %s", error);
+    return good;
+}
+
+/* Told before the work what would fail after it. */
+static bool check_reports(const options *o)
+{
+    char error[512];
+    const bool good = (!o->json || ascc_new_file_check(o->json, error, sizeof error)) &&
+                      (!o->csv || ascc_new_file_check(o->csv, error, sizeof error));
+    if (!good)
+        ascc_line(stderr, "ascc eval: %s", error);
+    return good;
 }
 
 int ascc_command_eval(int argc, char **argv)
@@ -145,9 +156,11 @@ int ascc_command_eval(int argc, char **argv)
     const char *settings;
     const ascc_method *method = ascc_method_find(o.method, &settings);
     if (!method) {
-        fprintf(stderr, "ascc eval: %s: no such method\n", o.method);
+        ascc_line(stderr, "ascc eval: %s: no such method", o.method);
         return 2;
     }
+    if (!check_reports(&o))
+        return 1;
     ascc_report_run *runs = calloc(o.sequence_count, sizeof *runs);
     bool fine = runs != NULL;
     for (size_t k = 0; k < o.sequence_count && fine; k++) {
@@ -161,7 +174,7 @@ int ascc_command_eval(int argc, char **argv)
             ascc_truth_free(&t);
         }
         if (!fine)
-            fprintf(stderr, "ascc eval: %s: %s\n", o.sequence[k], error.text);
+            ascc_line(stderr, "ascc eval: %s: %s", o.sequence[k], error.text);
     }
     fine = fine && write_reports(&o, runs);
     free(runs);

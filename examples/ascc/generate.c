@@ -7,6 +7,8 @@
 #include <sys/stat.h>
 
 #include "commands.h"
+#include "console.h"
+#include "new_file.h"
 #include "progress.h"
 #include "recipes.h"
 #include "sequence.h"
@@ -172,7 +174,7 @@ static void *work(void *data)
         j->made += good && !there;
         j->failed += !good;
         if (!good)
-            fprintf(stderr, "ascc generate: %s: %s\n", path, error);
+            ascc_line(stderr, "ascc generate: %s: %s", path, error);
         ascc_progress_add(&j->progress, 1);
         pthread_mutex_unlock(&j->lock);
     }
@@ -180,8 +182,9 @@ static void *work(void *data)
 
 static int generate(const request *q)
 {
-    if (mkdir(q->directory, 0777) != 0 && errno != EEXIST) {
-        fprintf(stderr, "ascc generate: %s: %s\n", q->directory, strerror(errno));
+    char error[512];
+    if (!ascc_make_folder(q->directory, error, sizeof error)) {
+        ascc_line(stderr, "ascc generate: %s", error);
         return 1;
     }
     const long teams = q->threads < q->count ? q->threads : q->count;
@@ -197,7 +200,8 @@ static int generate(const request *q)
         pthread_join(thread[t], NULL);
     ascc_progress_end(&j.progress);
     pthread_mutex_destroy(&j.lock);
-    printf("%s: %ld made, %ld there already, %ld failed\n", q->directory, j.made, j.kept, j.failed);
+    ascc_line(stdout, "%s: %ld made, %ld there already, %ld failed", q->directory, j.made, j.kept,
+              j.failed);
     return j.failed ? 1 : 0;
 }
 
@@ -265,25 +269,25 @@ int ascc_command_generate(int argc, char **argv)
         } else if (argv[i][0] != '-' && !q.kind) {
             q.kind = argv[i];
         } else if (i + 1 >= argc || !take_option(&q, argv[i], argv[i + 1])) {
-            fprintf(stderr, "ascc generate: '%s' is no option, or its value is wrong\n", argv[i]);
+            ascc_line(stderr, "ascc generate: '%s' is no option, or its value is wrong", argv[i]);
             return 2;
         } else {
             i++;
         }
     }
     if (!q.kind || !known(q.kind) || !q.directory) {
-        fprintf(stderr, "ascc generate: %s%s\n",
-                !q.kind          ? "no KIND given"
-                : !known(q.kind) ? "there is no kind "
-                                 : "no -o DIR",
-                q.kind && !known(q.kind) ? q.kind : "");
+        ascc_line(stderr, "ascc generate: %s%s",
+                  !q.kind          ? "no KIND given"
+                  : !known(q.kind) ? "there is no kind "
+                                   : "no -o DIR",
+                  q.kind && !known(q.kind) ? q.kind : "");
         usage(stderr);
         return 2;
     }
     recipe probe;
     const recipe_options options = q.recipe;
     if (recipe_make(q.kind, &options, &probe) != ASCC_OK) {
-        fprintf(stderr, "ascc generate: %s does not come in that dimension or spacing\n", q.kind);
+        ascc_line(stderr, "ascc generate: %s does not come in that dimension or spacing", q.kind);
         return 2;
     }
     recipe_free(&probe);

@@ -1,5 +1,6 @@
 /* Models and particle sets for the subcommands. SPDX-License-Identifier: MIT */
 #include "host.h"
+#include "console.h"
 
 #include <stdio.h>
 #include <stdlib.h>
@@ -40,7 +41,7 @@ ascc_status ascc_host_particles(ascc_context *context, const ascc_sequence *scen
     if (status == ASCC_OK)
         status = ascc_particles_add_boundary(*particles, scene->walls, &wall, &normal, 0, NULL);
     if (status != ASCC_OK) {
-        fprintf(stderr, "ascc: %s\n", ascc_particles_message(*particles));
+        ascc_line(stderr, "ascc: %s", ascc_particles_message(*particles));
         ascc_particles_destroy(particles);
     }
     return status;
@@ -51,6 +52,6 @@ void ascc_host_complain(ascc_context *context, const char *what, ascc_status sta
     char text[256] = "";
     if (context)
         (void)ascc_context_message(context, text, sizeof text);
-    fprintf(stderr, "ascc: %s: %s%s%s\n", what, ascc_status_text(status), text[0] ? ": " : "",
-            text);
+    ascc_line(stderr, "ascc: %s: %s%s%s", what, ascc_status_text(status), text[0] ? ": " : "",
+              text);
 }

@@ -4,44 +4,50 @@
 #include <string.h>
 
 #include "commands.h"
+#include "console.h"
 #include "host.h"
 
 static void print_model(const char *path, const ascc_model_info *m)
 {
-    printf("%s: model %s\n", path, m->name);
+    ascc_line(stdout, "%s: model %s", path, m->name);
     if (m->description[0])
-        printf("  %s\n", m->description);
-    printf("  dimension         %d\n", m->dimension);
-    printf("  levels, layers    %d, %d\n", m->level_count, m->layer_count);
-    printf("  parameters        %llu\n", (unsigned long long)m->parameter_count);
-    printf("  cost              about %.0f multiply-adds a particle and step\n", m->multiply_adds);
-    printf("  conserves         %s\n", m->conserves_angular_momentum ? "momentum, angular momentum"
-                                       : m->conserves_momentum       ? "momentum"
-                                                                     : "nothing exactly");
-    printf("  sees particles at %s\n",
-           m->advected ? "advected positions" : "their current positions");
-    printf("  radius            %g m, reaches %g m in a step\n", m->support_radius,
-           m->receptive_radius);
+        ascc_line(stdout, "  %s", m->description);
+    ascc_line(stdout, "  dimension         %d", m->dimension);
+    ascc_line(stdout, "  levels, layers    %d, %d", m->level_count, m->layer_count);
+    ascc_line(stdout, "  parameters        %llu", (unsigned long long)m->parameter_count);
+    ascc_line(stdout, "  cost              about %.0f multiply-adds a particle and step",
+              m->multiply_adds);
+    ascc_line(stdout, "  conserves         %s",
+              m->conserves_angular_momentum ? "momentum, angular momentum"
+              : m->conserves_momentum       ? "momentum"
+                                            : "nothing exactly");
+    ascc_line(stdout, "  sees particles at %s",
+              m->advected ? "advected positions" : "their current positions");
+    ascc_line(stdout, "  radius            %g m, reaches %g m in a step", m->support_radius,
+              m->receptive_radius);
     if (m->neighbor_limit)
-        printf("  neighbour limit   %d, mutual\n", m->neighbor_limit);
-    printf("  trained with      spacing %g m, time step %g s, gravity %g %g %g m/s^2, density %g\n",
-           m->particle_spacing, m->time_step, m->gravity[0], m->gravity[1], m->gravity[2],
-           m->rest_density);
+        ascc_line(stdout, "  neighbour limit   %d, mutual", m->neighbor_limit);
+    ascc_line(
+        stdout,
+        "  trained with      spacing %g m, time step %g s, gravity %g %g %g m/s^2, density %g",
+        m->particle_spacing, m->time_step, m->gravity[0], m->gravity[1], m->gravity[2],
+        m->rest_density);
 }
 
 static void print_sequence(const char *path, const ascc_sequence *s)
 {
-    printf("%s: sequence of particles\n", path);
-    printf("  dimension         %d\n", s->dimension);
-    printf("  frames            %zu, %g s apart\n", s->frames, s->time_step);
-    printf("  fluid particles   %zu, spacing %g m, mass %g kg\n", s->count, 2.0 * s->radius,
-           s->mass);
-    printf("  velocities        %s\n",
-           s->velocity_frames == s->frames ? "in every frame" : "in the first frame");
-    printf("  boundary points   %zu\n", s->walls);
-    printf("  gravity           %g %g %g m/s^2\n", s->gravity[0], s->gravity[1], s->gravity[2]);
+    ascc_line(stdout, "%s: sequence of particles", path);
+    ascc_line(stdout, "  dimension         %d", s->dimension);
+    ascc_line(stdout, "  frames            %zu, %g s apart", s->frames, s->time_step);
+    ascc_line(stdout, "  fluid particles   %zu, spacing %g m, mass %g kg", s->count,
+              2.0 * s->radius, s->mass);
+    ascc_line(stdout, "  velocities        %s",
+              s->velocity_frames == s->frames ? "in every frame" : "in the first frame");
+    ascc_line(stdout, "  boundary points   %zu", s->walls);
+    ascc_line(stdout, "  gravity           %g %g %g m/s^2", s->gravity[0], s->gravity[1],
+              s->gravity[2]);
     if (s->source[0])
-        printf("  source            %.160s\n", s->source);
+        ascc_line(stdout, "  source            %.160s", s->source);
 }
 
 int ascc_command_info(int argc, char **argv)
@@ -70,7 +76,7 @@ int ascc_command_info(int argc, char **argv)
             print_model(argv[0], &info);
     } else {
         ascc_host_complain(context, "neither a model nor a sequence", status);
-        fprintf(stderr, "ascc: read as a sequence: %s\n", error);
+        ascc_line(stderr, "ascc: read as a sequence: %s", error);
     }
     ascc_model_destroy(&model);
     ascc_context_destroy(&context);

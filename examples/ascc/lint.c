@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "commands.h"
+#include "console.h"
 #include "inspect.h"
 #include "sequence.h"
 
@@ -28,7 +29,7 @@ static bool lint_file(const char *path, const inspect_limits *limits, bool *unre
     ascc_sequence s;
     char error[256];
     if (!ascc_sequence_read(path, &s, error, sizeof error)) {
-        fprintf(stderr, "ascc lint: %s\n", error);
+        ascc_line(stderr, "ascc lint: %s", error);
         *unreadable = true;
         return false;
     }
@@ -47,15 +48,15 @@ static bool lint_file(const char *path, const inspect_limits *limits, bool *unre
     const ascc_status status = inspect(&input, limits, &f);
     ascc_sequence_free(&s);
     if (status != ASCC_OK) {
-        fprintf(stderr, "ascc lint: %s: %s\n", path, ascc_status_text(status));
+        ascc_line(stderr, "ascc lint: %s: %s", path, ascc_status_text(status));
         *unreadable = true;
         return false;
     }
-    printf("%-6s %5.2f %5.2f %5zu %5zu  %.4f %.4f  %.4f %.4f  %.3f %.3f  %s%s%s\n",
-           f.verdict ? "reject" : "pass", f.fastest, f.reach > 0.0 ? f.fastest / f.reach : 0.0,
-           f.spikes, f.escapes, f.pair_mean, f.pair_worst, f.clump_mean, f.clump_worst,
-           f.density_mean, f.density_worst, path, f.verdict ? ": " : "",
-           f.verdict ? f.verdict : "");
+    ascc_line(stdout, "%-6s %5.2f %5.2f %5zu %5zu  %.4f %.4f  %.4f %.4f  %.3f %.3f  %s%s%s",
+              f.verdict ? "reject" : "pass", f.fastest, f.reach > 0.0 ? f.fastest / f.reach : 0.0,
+              f.spikes, f.escapes, f.pair_mean, f.pair_worst, f.clump_mean, f.clump_worst,
+              f.density_mean, f.density_worst, path, f.verdict ? ": " : "",
+              f.verdict ? f.verdict : "");
     return f.verdict == NULL;
 }
 
@@ -76,7 +77,7 @@ int ascc_command_lint(int argc, char **argv)
         if (value && first + 1 < argc)
             *value = strtod(argv[first + 1], &end);
         if (!end || *end || !(*value > 0.0)) {
-            fprintf(stderr, "ascc lint: %s needs a positive number\n", argv[first]);
+            ascc_line(stderr, "ascc lint: %s needs a positive number", argv[first]);
             usage(stderr);
             return 2;
         }
@@ -86,7 +87,8 @@ int ascc_command_lint(int argc, char **argv)
         return 2;
     }
     bool good = true, unreadable = false;
-    printf("       speed /reach spike  out  near mean, worst  clump mean, worst  density, top\n");
+    ascc_line(stdout,
+              "       speed /reach spike  out  near mean, worst  clump mean, worst  density, top");
     for (int i = first; i < argc; i++)
         good &= lint_file(argv[i], &limits, &unreadable);
     return unreadable ? 2 : good ? 0 : 1;

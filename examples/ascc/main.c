@@ -5,6 +5,7 @@
 #include <ascc/ascc.h>
 
 #include "commands.h"
+#include "console.h"
 
 static const struct {
     const char *name, *text;
@@ -27,7 +28,7 @@ static void usage(FILE *out)
     fprintf(out, "  %-10s print the version\n\nascc COMMAND --help tells more.\n", "version");
 }
 
-int main(int argc, char **argv)
+static int run(int argc, char **argv)
 {
     const char *name = argc > 1 ? argv[1] : "";
     for (size_t i = 0; i < sizeof commands / sizeof *commands; i++)
@@ -35,12 +36,18 @@ int main(int argc, char **argv)
             return commands[i].run(argc - 2, argv + 2);
     if (strcmp(name, "version") == 0 || strcmp(name, "--version") == 0) {
         const int32_t v = ascc_version();
-        printf("ascc %d.%d.%d\n", v / 10000, v / 100 % 100, v % 100);
+        ascc_line(stdout, "ascc %d.%d.%d", v / 10000, v / 100 % 100, v % 100);
         return 0;
     }
     const int help = strcmp(name, "help") == 0 || strcmp(name, "--help") == 0;
     if (!help && argc > 1)
-        fprintf(stderr, "ascc: '%s' is no command\n", name);
+        ascc_line(stderr, "ascc: '%s' is no command", name);
     usage(help ? stdout : stderr);
     return help ? 0 : 2;
+}
+
+int main(int argc, char **argv)
+{
+    ascc_console_open();
+    return ascc_console_close(run(argc, argv));
 }

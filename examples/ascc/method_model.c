@@ -7,6 +7,7 @@
 #include <ascc/ascc.h>
 
 #include "host.h"
+#include "console.h"
 #include "method.h"
 
 typedef struct learned {
@@ -71,8 +72,8 @@ static bool learned_open(const char *settings, const ascc_method_scene *scene, v
         return false;
     }
     if (fabs(scene->spacing - m->spacing) > 0.01 * m->spacing)
-        fprintf(stderr, "ascc: a scene with spacing %g m, a model trained with %g m\n",
-                scene->spacing, m->spacing);
+        ascc_line(stderr, "ascc: a scene with spacing %g m, a model trained with %g m",
+                  scene->spacing, m->spacing);
     *state = m;
     return true;
 }

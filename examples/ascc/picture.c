@@ -1,6 +1,7 @@
 /* A small software renderer: discs sorted by depth, a bitmap font, libpng.
  * SPDX-License-Identifier: MIT */
 #include "picture.h"
+#include "new_file.h"
 
 #include <math.h>
 #include <png.h>
@@ -273,6 +274,19 @@ static void draw_scale(canvas *c, const ascc_view *v)
     write_text(c, WIDTH - MARGIN - 12 * (int)strlen(text) + 2, 40, 2, text);
 }
 
+static bool write_png(const char *path, png_image *image, const unsigned char *pixel, char *error,
+                      size_t capacity)
+{
+    ascc_new_file output;
+    if (!ascc_new_file_open(&output, path, error, capacity))
+        return false;
+    const bool good = png_image_write_to_stdio(image, output.stream, 0, pixel, 0, NULL) != 0;
+    if (!good)
+        (void)snprintf(error, capacity, "%s: the picture cannot be written: %s", path,
+                       image->message);
+    return ascc_new_file_close(&output, good, error, capacity) && good;
+}
+
 bool ascc_picture_write(const char *path, const ascc_view *view, const float *position,
                         const float *velocity, size_t count, const char *text, char *error,
                         size_t capacity)
@@ -297,10 +311,9 @@ bool ascc_picture_write(const char *path, const ascc_view *view, const float *po
     write_text(&c, MARGIN, 22, 2, text);
     png_image image = {
         .version = PNG_IMAGE_VERSION, .width = WIDTH, .height = HEIGHT, .format = PNG_FORMAT_RGB};
-    good = good && png_image_write_to_file(&image, path, 0, c.pixel, 0, NULL);
     if (!good)
-        (void)snprintf(error, capacity, "%s: the picture cannot be written%s%s", path,
-                       image.message[0] ? ": " : "", image.message);
+        (void)snprintf(error, capacity, "%s: no memory for a picture", path);
+    good = good && write_png(path, &image, c.pixel, error, capacity);
     free(c.pixel);
     return good;
 }

@@ -1,5 +1,6 @@
 /* PLY: a text header and packed little-endian rows. SPDX-License-Identifier: MIT */
 #include "ply.h"
+#include "new_file.h"
 
 #include <errno.h>
 #include <stdio.h>
@@ -22,15 +23,16 @@ bool ascc_ply_write(const char *path, int32_t dimension, const float *position,
                     const float *velocity, const uint64_t *id, size_t count, char *error,
                     size_t capacity)
 {
-    FILE *out = fopen(path, "wb");
-    bool good = out != NULL;
-    if (good)
-        good = fprintf(out,
-                       "ply\nformat binary_little_endian 1.0\nelement vertex %zu\n"
-                       "property float x\nproperty float y\nproperty float z\n"
-                       "property float vx\nproperty float vy\nproperty float vz\n"
-                       "property uint id\nend_header\n",
-                       count) > 0;
+    ascc_new_file output;
+    if (!ascc_new_file_open(&output, path, error, capacity))
+        return false;
+    FILE *out = output.stream;
+    bool good = fprintf(out,
+                        "ply\nformat binary_little_endian 1.0\nelement vertex %zu\n"
+                        "property float x\nproperty float y\nproperty float z\n"
+                        "property float vx\nproperty float vy\nproperty float vz\n"
+                        "property uint id\nend_header\n",
+                        count) > 0;
     const size_t d = (size_t)dimension;
     for (size_t i = 0; good && i < count; i++) {
         unsigned char row[28];
@@ -41,9 +43,7 @@ bool ascc_ply_write(const char *path, int32_t dimension, const float *position,
         put_word(row + 24, (uint32_t)id[i]);
         good = fwrite(row, 1, sizeof row, out) == sizeof row;
     }
-    if (out)
-        good = fclose(out) == 0 && good;
     if (!good)
-        (void)snprintf(error, capacity, "%s: %s", path, strerror(errno));
-    return good;
+        (void)snprintf(error, capacity, "%s: cannot be written: %s", path, strerror(errno));
+    return ascc_new_file_close(&output, good, error, capacity) && good;
 }

@@ -5,6 +5,8 @@
 #include <string.h>
 
 #include "report.h"
+#include "console.h"
+#include "new_file.h"
 
 void ascc_report_add(ascc_report_run *run, double value, const char *name, ...)
 {
@@ -51,9 +53,12 @@ static void table_block(FILE *file, const ascc_report_run *runs, size_t count)
 {
     fprintf(file, "%-26s", "");
     for (size_t r = 0; r < count; r++) {
-        const char *name = runs[r].sequence;
-        const size_t length = strlen(name);
-        fprintf(file, " %14s", length > 14 ? name + length - 14 : name);
+        const size_t length = strlen(runs[r].sequence);
+        char name[15];
+        (void)snprintf(name, sizeof name, "%.14s",
+                       runs[r].sequence + (length > 14 ? length - 14 : 0));
+        ascc_printable(name);
+        fprintf(file, " %14s", name);
     }
     fputc('\n', file);
     for (size_t first = 0; first < count; first++)
@@ -68,13 +73,13 @@ static void table_block(FILE *file, const ascc_report_run *runs, size_t count)
         }
     for (size_t r = 0; r < count; r++)
         if (runs[r].note[0])
-            fprintf(file, "%s: %s\n", runs[r].sequence, runs[r].note);
+            ascc_line(file, "%s: %s", runs[r].sequence, runs[r].note);
 }
 
 void ascc_report_table(FILE *file, const char *method, const ascc_report_run *runs, size_t count,
                        size_t columns)
 {
-    fprintf(file, "%s\n", method);
+    ascc_line(file, "%s", method);
     for (size_t first = 0; first < count; first += columns)
         table_block(file, runs + first, count - first < columns ? count - first : columns);
 }
@@ -111,18 +116,13 @@ static void json_run(FILE *file, const ascc_report_run *run)
     fputc('}', file);
 }
 
-static bool finish(FILE *file)
-{
-    const bool written = !ferror(file);
-    return fclose(file) == 0 && written;
-}
-
 bool ascc_report_json(const char *path, const char *method, const ascc_report_run *runs,
-                      size_t count)
+                      size_t count, char *error, size_t capacity)
 {
-    FILE *file = fopen(path, "w");
-    if (!file)
+    ascc_new_file output;
+    if (!ascc_new_file_open(&output, path, error, capacity))
         return false;
+    FILE *file = output.stream;
     fputs("{\"method\": ", file);
     json_text(file, method);
     fputs(", \"runs\": [", file);
@@ -131,7 +131,7 @@ bool ascc_report_json(const char *path, const char *method, const ascc_report_ru
         fputs(r + 1 < count ? "," : "", file);
     }
     fputs("\n]}\n", file);
-    return finish(file);
+    return ascc_new_file_close(&output, true, error, capacity);
 }
 
 static void csv_text(FILE *file, const char *text)
@@ -146,11 +146,12 @@ static void csv_text(FILE *file, const char *text)
 }
 
 bool ascc_report_csv(const char *path, const char *method, const ascc_report_run *runs,
-                     size_t count)
+                     size_t count, char *error, size_t capacity)
 {
-    FILE *file = fopen(path, "w");
-    if (!file)
+    ascc_new_file output;
+    if (!ascc_new_file_open(&output, path, error, capacity))
         return false;
+    FILE *file = output.stream;
     fputs("method,sequence,figure,value\n", file);
     for (size_t r = 0; r < count; r++)
         for (size_t i = 0; i < runs[r].count; i++) {
@@ -162,5 +163,5 @@ bool ascc_report_csv(const char *path, const char *method, const ascc_report_run
                 fprintf(file, "%.17g", runs[r].figure[i].value);
             fputc('\n', file);
         }
-    return finish(file);
+    return ascc_new_file_close(&output, true, error, capacity);
 }

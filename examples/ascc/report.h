@@ -32,11 +32,12 @@ void ascc_report_add(ascc_report_run *run, double value, const char *name, ...)
 /** Rows are figures, columns are runs, `columns` at a time. */
 void ascc_report_table(FILE *file, const char *method, const ascc_report_run *runs, size_t count,
                        size_t columns);
+/* Both: false with one line in error. */
 /** {"method": ..., "runs": [{"sequence": ..., "note": ..., figures}]}; numbers read back exactly. */
 bool ascc_report_json(const char *path, const char *method, const ascc_report_run *runs,
-                      size_t count);
+                      size_t count, char *error, size_t capacity);
 /** One line a figure: method,sequence,figure,value. */
 bool ascc_report_csv(const char *path, const char *method, const ascc_report_run *runs,
-                     size_t count);
+                     size_t count, char *error, size_t capacity);
 
 #endif

@@ -1,6 +1,8 @@
 /* Sequence files: safetensors with a checked header, streamed out frame by frame.
  * SPDX-License-Identifier: MIT */
 #include "sequence.h"
+#include "console.h"
+#include "new_file.h"
 
 #include <errno.h>
 #include <math.h>
@@ -30,6 +32,7 @@ static bool fail(const report *r, const char *format, ...)
     (void)vsnprintf(text, sizeof text, format, arguments);
     va_end(arguments);
     (void)snprintf(r->error, r->capacity, "%s: %s", r->path, text);
+    ascc_printable(r->error); /* much of it is the file's */
     return false;
 }
 
@@ -112,11 +115,17 @@ static bool numbers(const file *f, const char *key, size_t count, double *values
                                  text_of(f, key), count);
 }
 
-static bool positive(const file *f, const char *key, double *value)
+/* Limits beyond all scenes, and so that energies of finite positions and velocities are finite. */
+static bool within(const file *f, const char *key, size_t count, double low, double high,
+                   double *values)
 {
-    if (!numbers(f, key, 1, value))
+    if (!numbers(f, key, count, values))
         return false;
-    return *value > 0.0 || fail(&f->report, "metadata %s = %g is not positive", key, *value);
+    for (size_t i = 0; i < count; i++)
+        if (!(values[i] >= low && values[i] <= high))
+            return fail(&f->report, "metadata %s = %g is not within %g and %g", key, values[i], low,
+                        high);
+    return true;
 }
 
 static bool read_metadata(const file *f, ascc_sequence *s)
@@ -133,9 +142,11 @@ static bool read_metadata(const file *f, ascc_sequence *s)
     if (dimension != 2.0 && dimension != 3.0)
         return fail(&f->report, "metadata dim = %g: 2 or 3 is wanted", dimension);
     s->dimension = (int32_t)dimension;
-    if (!positive(f, "dt", &s->time_step) || !positive(f, "particle_radius", &s->radius) ||
-        !positive(f, "particle_mass", &s->mass) || !positive(f, "rest_density", &s->rest_density) ||
-        !numbers(f, "gravity", (size_t)s->dimension, s->gravity))
+    if (!within(f, "dt", 1, 1e-9, 1e6, &s->time_step) ||
+        !within(f, "particle_radius", 1, 1e-7, 1e6, &s->radius) ||
+        !within(f, "particle_mass", 1, 1e-30, 1e30, &s->mass) ||
+        !within(f, "rest_density", 1, 1e-6, 1e9, &s->rest_density) ||
+        !within(f, "gravity", (size_t)s->dimension, -1e6, 1e6, s->gravity))
         return false;
     const char *source = text_of(f, "source");
     (void)snprintf(s->source, sizeof s->source, "%s", source ? source : "");
@@ -238,9 +249,8 @@ void ascc_sequence_free(ascc_sequence *sequence)
 /* ---- Writing ---- */
 
 struct ascc_sequence_writer {
-    char *path, *part, *velocity_part;
-    FILE *out,
-        *velocities;      /* positions behind room for the header; velocities apart till the end */
+    ascc_new_file output; /* positions behind room for the header */
+    FILE *velocities;     /* apart till the end */
     ascc_sequence header; /* walls copied */
     bool all_velocities;
     bool broken; /* a frame was written in part */
@@ -259,32 +269,13 @@ static float *copied(const float *from, size_t count)
     return to;
 }
 
-static void drop_writer(ascc_sequence_writer *w)
+static void free_writer(ascc_sequence_writer *w)
 {
-    if (w->out)
-        (void)fclose(w->out);
     if (w->velocities)
         (void)fclose(w->velocities);
-    if (w->velocity_part)
-        (void)remove(w->velocity_part);
-    if (w->part)
-        (void)remove(w->part);
-    free(w->path);
-    free(w->part);
-    free(w->velocity_part);
     free(w->header.wall);
     free(w->header.normal);
     free(w);
-}
-
-static char *suffixed(const char *path, const char *suffix)
-{
-    char *name = malloc(strlen(path) + strlen(suffix) + 1);
-    if (name) {
-        strcpy(name, path);
-        strcat(name, suffix);
-    }
-    return name;
 }
 
 ascc_sequence_writer *ascc_sequence_create(const char *path, const ascc_sequence *header,
@@ -303,33 +294,31 @@ ascc_sequence_writer *ascc_sequence_create(const char *path, const ascc_sequence
     w->header.wall = copied(header->wall, walls);
     w->header.normal = copied(header->normal, walls);
     w->all_velocities = all_velocities;
-    w->path = suffixed(path, "");
-    w->part = suffixed(path, ".part");
-    w->velocity_part = suffixed(path, ".velocity.part");
-    bool good = w->header.wall && w->header.normal && w->path && w->part && w->velocity_part;
+    bool good = w->header.wall && w->header.normal;
     if (!good)
         (void)fail(&r, "no memory");
+    good = good && ascc_new_file_open(&w->output, path, error, capacity);
     if (good) {
         static const char room[HEADER_ROOM];
-        w->out = fopen(w->part, "wb+");
-        w->velocities = fopen(w->velocity_part, "wb+");
-        good = w->out && w->velocities && fwrite(room, 1, sizeof room, w->out) == sizeof room;
+        w->velocities = ascc_new_file_scratch(&w->output);
+        good = w->velocities && fwrite(room, 1, sizeof room, w->output.stream) == sizeof room;
         if (!good)
             (void)out_of_order(&r);
     }
     if (good)
         return w;
-    drop_writer(w);
+    (void)ascc_new_file_close(&w->output, false, error, capacity);
+    free_writer(w);
     return NULL;
 }
 
 bool ascc_sequence_append(ascc_sequence_writer *w, const float *position, const float *velocity,
                           char *error, size_t capacity)
 {
-    const report r = {w->path, error, capacity};
+    const report r = {w->output.path, error, capacity};
     const size_t n = w->header.count * (size_t)w->header.dimension;
     const bool moving = w->all_velocities || w->header.frames == 0;
-    w->broken = w->broken || fwrite(position, sizeof(float), n, w->out) != n ||
+    w->broken = w->broken || fwrite(position, sizeof(float), n, w->output.stream) != n ||
                 (moving && fwrite(velocity, sizeof(float), n, w->velocities) != n);
     if (w->broken)
         return out_of_order(&r);
@@ -419,26 +408,24 @@ static bool write_header(ascc_sequence_writer *w)
         room[i] = (unsigned char)((uint64_t)(HEADER_ROOM - 8) >> 8 * i);
     memcpy(room + 8, text, length);
     free(text);
-    return fseek(w->out, 0, SEEK_SET) == 0 && fwrite(room, 1, sizeof room, w->out) == sizeof room;
+    return fseek(w->output.stream, 0, SEEK_SET) == 0 &&
+           fwrite(room, 1, sizeof room, w->output.stream) == sizeof room;
 }
 
 bool ascc_sequence_finish(ascc_sequence_writer *w, bool keep, char *error, size_t capacity)
 {
     if (!w)
         return false;
-    const report r = {w->path, error, capacity};
+    const report r = {w->output.path, error, capacity};
     const size_t walls = w->header.walls * (size_t)w->header.dimension;
-    bool good = true;
-    if (keep) {
-        good = !w->broken && append_file(w->out, w->velocities) &&
-               fwrite(w->header.wall, sizeof(float), walls, w->out) == walls &&
-               fwrite(w->header.normal, sizeof(float), walls, w->out) == walls && write_header(w);
-        good = fclose(w->out) == 0 && good;
-        w->out = NULL;
-        good = good && rename(w->part, w->path) == 0;
-        if (!good)
-            (void)out_of_order(&r);
-    }
-    drop_writer(w);
+    FILE *out = w->output.stream;
+    bool good =
+        !keep || (!w->broken && append_file(out, w->velocities) &&
+                  fwrite(w->header.wall, sizeof(float), walls, out) == walls &&
+                  fwrite(w->header.normal, sizeof(float), walls, out) == walls && write_header(w));
+    if (!good)
+        (void)out_of_order(&r);
+    good = ascc_new_file_close(&w->output, keep && good, error, capacity) && good;
+    free_writer(w);
     return good;
 }

@@ -1,11 +1,11 @@
 /* ascc show: pictures of a sequence's frames. SPDX-License-Identifier: MIT */
-#include <errno.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/stat.h>
 
 #include "commands.h"
+#include "console.h"
+#include "new_file.h"
 #include "picture.h"
 #include "progress.h"
 
@@ -57,10 +57,8 @@ static void velocities(const ascc_sequence *s, size_t frame, float *v)
 
 static bool show(const options *o, const ascc_sequence *s, char *error, size_t capacity)
 {
-    if (mkdir(o->folder, 0777) != 0 && errno != EEXIST) {
-        (void)snprintf(error, capacity, "%s: %s", o->folder, strerror(errno));
+    if (!ascc_make_folder(o->folder, error, capacity))
         return false;
-    }
     const size_t n = s->count * (size_t)s->dimension;
     float *v = malloc((n + 1) * sizeof *v);
     if (!v) {
@@ -96,12 +94,12 @@ int ascc_command_show(int argc, char **argv)
     ascc_sequence s;
     char error[768];
     if (!ascc_sequence_read(o.sequence, &s, error, sizeof error)) {
-        fprintf(stderr, "ascc show: %s\n", error);
+        ascc_line(stderr, "ascc show: %s", error);
         return 1;
     }
     const bool good = show(&o, &s, error, sizeof error);
     if (!good)
-        fprintf(stderr, "ascc show: %s\n", error);
+        ascc_line(stderr, "ascc show: %s", error);
     ascc_sequence_free(&s);
     return good ? 0 : 1;
 }

@@ -6,11 +6,12 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/stat.h>
 #include <unistd.h>
 
 #include "commands.h"
+#include "console.h"
 #include "host.h"
+#include "new_file.h"
 #include "picture.h"
 #include "ply.h"
 #include "progress.h"
@@ -51,8 +52,8 @@ static void usage(FILE *to)
 
 static bool bad_use(const char *what, const char *value)
 {
-    fprintf(stderr, "ascc sim: %s%s%s; ascc sim --help tells more\n", what, value ? ": " : "",
-            value ? value : "");
+    ascc_line(stderr, "ascc sim: %s%s%s; ascc sim --help tells more", what, value ? ": " : "",
+              value ? value : "");
     return false;
 }
 
@@ -64,8 +65,8 @@ static bool whole(const char *name, const char *text, long low, long high, int32
     errno = 0;
     const long n = strtol(text, &end, 10);
     if (errno || *end || end == text || n < low || n > high) {
-        fprintf(stderr, "ascc sim: %s %s: a whole number from %ld to %ld is wanted\n", name, text,
-                low, high);
+        ascc_line(stderr, "ascc sim: %s %s: a whole number from %ld to %ld is wanted", name, text,
+                  low, high);
         return false;
     }
     *value = (int32_t)n;
@@ -77,8 +78,8 @@ static bool real(const char *name, const char *text, double low, double high, do
     char *end;
     *value = strtod(text, &end);
     if (*end || end == text || !(*value >= low && *value <= high)) {
-        fprintf(stderr, "ascc sim: %s %s: a number from %g to %g is wanted\n", name, text, low,
-                high);
+        ascc_line(stderr, "ascc sim: %s %s: a number from %g to %g is wanted", name, text, low,
+                  high);
         return false;
     }
     return true;
@@ -100,7 +101,7 @@ static bool vector(const char *name, const char *text, double value[3], int32_t 
             break;
         at = end + 1;
     }
-    fprintf(stderr, "ascc sim: %s %s: two or three numbers with commas are wanted\n", name, text);
+    ascc_line(stderr, "ascc sim: %s %s: two or three numbers with commas are wanted", name, text);
     return false;
 }
 
@@ -229,14 +230,6 @@ typedef struct simulation {
     char error[768];
 } simulation;
 
-static bool make_directory(simulation *s, const char *path)
-{
-    if (!path || mkdir(path, 0777) == 0 || errno == EEXIST)
-        return true;
-    (void)snprintf(s->error, sizeof s->error, "%s: %s", path, strerror(errno));
-    return false;
-}
-
 static bool read_state(simulation *s)
 {
     const ascc_array x = {.data = s->position}, v = {.data = s->velocity};
@@ -349,39 +342,42 @@ static void print_momentum(const simulation *s)
         drift += (double)s->drift[c] * q * (double)s->drift[c] * q;
         start += s->first.momentum[c] * s->first.momentum[c];
     }
-    printf("momentum error      %.3g  (%" PRId64 " %" PRId64 " %" PRId64
-           " quanta of %.3g kg m/s%s)\n",
-           sqrt(drift) / (sqrt(start) + 1e-10), s->drift[0], s->drift[1], s->drift[2], q,
-           info.conserves_momentum ? "" : "; this model does not conserve it");
+    ascc_line(stdout,
+              "momentum error      %.3g  (%" PRId64 " %" PRId64 " %" PRId64
+              " quanta of %.3g kg m/s%s)",
+              sqrt(drift) / (sqrt(start) + 1e-10), s->drift[0], s->drift[1], s->drift[2], q,
+              info.conserves_momentum ? "" : "; this model does not conserve it");
     if (!weightless(s)) {
-        printf("angular mom. error  not measured: gravity or walls turn the fluid\n");
+        ascc_line(stdout, "angular mom. error  not measured: gravity or walls turn the fluid");
         return;
     }
     double turn = 0.0;
     for (int c = 0; c < 3; c++)
         turn += pow(s->last.angular_momentum[c] - s->first.angular_momentum[c], 2.0);
-    printf("angular mom. error  %.3g  of sum m |x| |v|%s\n",
-           sqrt(turn) / (s->first.angular_scale + 1e-10),
-           info.conserves_angular_momentum ? "" : "; this model does not conserve it");
+    ascc_line(stdout, "angular mom. error  %.3g  of sum m |x| |v|%s",
+              sqrt(turn) / (s->first.angular_scale + 1e-10),
+              info.conserves_angular_momentum ? "" : "; this model does not conserve it");
 }
 
 static void print_table(const simulation *s)
 {
     const double n = s->steps ? s->steps : 1;
-    printf("particles           %zu fluid, %zu boundary\n", s->scene.count, s->scene.walls);
-    printf("steps               %d of %g s, %d threads\n", s->steps, s->time_step, s->o->threads);
+    ascc_line(stdout, "particles           %zu fluid, %zu boundary", s->scene.count,
+              s->scene.walls);
+    ascc_line(stdout, "steps               %d of %g s, %d threads", s->steps, s->time_step,
+              s->o->threads);
     for (int32_t i = 0; i < s->stage_count; i++)
-        printf("  %-17s %9.3f ms a step\n", s->stage[i], 1e3 * s->seconds[i] / n);
-    printf("  %-17s %9.3f ms a step\n", "total", 1e3 * s->seconds_total / n);
+        ascc_line(stdout, "  %-17s %9.3f ms a step", s->stage[i], 1e3 * s->seconds[i] / n);
+    ascc_line(stdout, "  %-17s %9.3f ms a step", "total", 1e3 * s->seconds_total / n);
     if (s->scene.count)
-        printf("  %-17s %9.3f us a step\n", "per particle",
-               1e6 * s->seconds_total / n / (double)s->scene.count);
+        ascc_line(stdout, "  %-17s %9.3f us a step", "per particle",
+                  1e6 * s->seconds_total / n / (double)s->scene.count);
     print_momentum(s);
-    printf("max. density error  %.1f %%  of rest density, over all frames\n",
-           100.0 * fmax(0.0, s->max_density - 1.0));
-    printf("energy              kinetic %.4g to %.4g J, potential %.4g to %.4g J\n",
-           s->first.kinetic_energy, s->last.kinetic_energy, potential(s, &s->first),
-           potential(s, &s->last));
+    ascc_line(stdout, "max. density error  %.1f %%  of rest density, over all frames",
+              100.0 * fmax(0.0, s->max_density - 1.0));
+    ascc_line(stdout, "energy              kinetic %.4g to %.4g J, potential %.4g to %.4g J",
+              s->first.kinetic_energy, s->last.kinetic_energy, potential(s, &s->first),
+              potential(s, &s->last));
 }
 
 /* ---- From arguments to table ---- */
@@ -449,7 +445,8 @@ static bool open_outputs(simulation *s)
     }
     (void)ascc_particles_get_ids(s->particles, ASCC_FLUID, 0, s->scene.count, s->id);
     s->view = ascc_view_of(&s->scene);
-    if (!make_directory(s, s->o->frames) || !make_directory(s, s->o->ply))
+    if ((s->o->frames && !ascc_make_folder(s->o->frames, s->error, sizeof s->error)) ||
+        (s->o->ply && !ascc_make_folder(s->o->ply, s->error, sizeof s->error)))
         return false;
     if (!s->o->out)
         return true;
@@ -497,13 +494,13 @@ int ascc_command_sim(int argc, char **argv)
     char finish[512] = "";
     /* What was computed before a step failed is kept. */
     if (s.writer && !ascc_sequence_finish(s.writer, s.steps > 0 || good, finish, sizeof finish)) {
-        fprintf(stderr, "ascc sim: %s\n", finish);
+        ascc_line(stderr, "ascc sim: %s", finish);
         good = false;
     }
     if (s.error[0])
-        fprintf(stderr, "ascc sim: %s\n", s.error);
+        ascc_line(stderr, "ascc sim: %s", s.error);
     if (interrupted)
-        fprintf(stderr, "ascc sim: interrupted after %d steps\n", s.steps);
+        ascc_line(stderr, "ascc sim: interrupted after %d steps", s.steps);
     close_all(&s);
     return !good ? 1 : interrupted ? 130 : 0;
 }

@@ -6,7 +6,6 @@
  * to the checkpoint's iteration.
  */
 #include <errno.h>
-#include <fcntl.h>
 #include <inttypes.h>
 #include <math.h>
 #include <signal.h>
@@ -20,7 +19,9 @@
 #include <ascc/train.h>
 
 #include "commands.h"
+#include "console.h"
 #include "evaluate.h"
+#include "new_file.h"
 #include "progress.h"
 #include "sequence.h"
 #include "train_config.h"
@@ -74,35 +75,6 @@ static uint64_t schedule_end(const training *t)
 
 /* ---- Files ---------------------------------------------------------------------------------------- */
 
-static bool write_all(int file, const unsigned char *bytes, size_t size)
-{
-    while (size > 0) {
-        const ssize_t n = write(file, bytes, size);
-        if (n < 0 && errno != EINTR)
-            return false;
-        bytes += n > 0 ? n : 0;
-        size -= n > 0 ? (size_t)n : 0;
-    }
-    return true;
-}
-
-/* Beside the path, synced, renamed: a file of that name is whole. */
-static bool replace_file(training *t, const char *path, const void *bytes, size_t size)
-{
-    char part[ASCC_TRAIN_PATH + 8];
-    (void)snprintf(part, sizeof part, "%s.part", path);
-    const int file = open(part, O_WRONLY | O_CREAT | O_TRUNC, 0666);
-    bool good = file >= 0 && write_all(file, bytes, size) && fsync(file) == 0;
-    const int why = errno;
-    good = (file < 0 || close(file) == 0) && good;
-    good = good && rename(part, path) == 0;
-    if (good)
-        return true;
-    (void)fail(t, path, strerror(why ? why : errno));
-    (void)unlink(part);
-    return false;
-}
-
 static unsigned char *read_whole(training *t, const char *path, size_t *size)
 {
     FILE *file = fopen(path, "rb");
@@ -127,7 +99,13 @@ static bool write_model(training *t, const char *path)
 {
     size_t size;
     const void *bytes = ascc_trainer_model(t->trainer, t->config.options.average > 0.0, &size);
-    return bytes ? replace_file(t, path, bytes, size) : fail(t, path, "no memory");
+    if (!bytes)
+        return fail(t, path, "no memory");
+    ascc_new_file output;
+    if (!ascc_new_file_open(&output, path, t->error, sizeof t->error))
+        return false;
+    (void)fwrite(bytes, 1, size, output.stream); /* closing tells whether it succeeded */
+    return ascc_new_file_close(&output, true, t->error, sizeof t->error);
 }
 
 /* ---- Sequences ------------------------------------------------------------------------------------ */
@@ -363,8 +341,8 @@ static bool run(training *t)
     if (!good) /* the first error is the one to tell */
         memcpy(t->error, first, sizeof first);
     if (!good && saved)
-        fprintf(stderr, "ascc train: %s and %s hold iteration %" PRIu64 "\n", t->config.checkpoint,
-                t->config.latest, ascc_trainer_iteration(t->trainer));
+        ascc_line(stderr, "ascc train: %s and %s hold iteration %" PRIu64, t->config.checkpoint,
+                  t->config.latest, ascc_trainer_iteration(t->trainer));
     return saved && good;
 }
 
@@ -448,7 +426,7 @@ static bool load_checkpoint(training *t)
     if (there && !t->resume)
         return fail(t, path, "is there already: --resume goes on from it; move it to begin anew");
     if (!there && t->resume)
-        fprintf(stderr, "ascc train: %s: not there yet, training begins\n", path);
+        ascc_line(stderr, "ascc train: %s: not there yet, training begins", path);
     if (there && ascc_trainer_load(t->trainer, path) != ASCC_OK)
         return fail(t, path, ascc_trainer_message(t->trainer));
     return true;
@@ -465,9 +443,22 @@ static void make_folder(const char *path)
     (void)mkdir(folder, 0777);
 }
 
+/* Told before the work what would fail after it. */
+static bool check_outputs(training *t)
+{
+    const ascc_train_config *c = &t->config;
+    const char *const paths[] = {c->output, c->latest, c->checkpoint, c->log, c->chart};
+    for (size_t i = 0; i < sizeof paths / sizeof *paths; i++)
+        if (!ascc_new_file_check(paths[i], t->error, sizeof t->error))
+            return false;
+    return true;
+}
+
 static bool open_all(training *t)
 {
     make_folder(t->config.output);
+    if (!check_outputs(t))
+        return false;
     char why[512];
     if (!create_trainer(t) || !load_checkpoint(t) || !add_sequences(t) || !load_truths(t))
         return false;
@@ -493,19 +484,20 @@ static void print_result(const training *t)
     const ascc_train_config *c = &t->config;
     const ascc_validation *best = &t->log.best;
     const uint64_t done = ascc_trainer_iteration(t->trainer);
-    printf("%s: %" PRIu64 " iterations, %.0f s\n", c->output, done, t->log.seconds);
+    ascc_line(stdout, "%s: %" PRIu64 " iterations, %.0f s", c->output, done, t->log.seconds);
     if (best->measured)
-        printf("  best on valid      errors %.4g and %.4g mm, %s\n", 1e3 * best->error[0],
-               1e3 * best->error[1], best->stable ? "rollouts hold" : "rollouts lose particles");
+        ascc_line(stdout, "  best on valid      errors %.4g and %.4g mm, %s", 1e3 * best->error[0],
+                  1e3 * best->error[1], best->stable ? "rollouts hold" : "rollouts lose particles");
     if (c->valid.count)
-        printf("  latest             %s\n", c->latest);
+        ascc_line(stdout, "  latest             %s", c->latest);
     if (ascc_train_log_chart(c->log, c->chart, best->measured))
-        printf("  log, chart         %s, %s\n", c->log, c->chart);
+        ascc_line(stdout, "  log, chart         %s, %s", c->log, c->chart);
     else
-        printf("  log                %s; no chart: gnuplot is not installed, or failed\n", c->log);
+        ascc_line(stdout, "  log                %s; no chart: gnuplot is not installed, or failed",
+                  c->log);
     if (done < schedule_end(t))
-        printf("stopped before %" PRIu64 " iterations; ascc train %s --resume goes on\n",
-               schedule_end(t), t->path);
+        ascc_line(stdout, "stopped before %" PRIu64 " iterations; ascc train %s --resume goes on",
+                  schedule_end(t), t->path);
 }
 
 /* ---- Arguments ------------------------------------------------------------------------------------ */
@@ -546,7 +538,7 @@ static bool read_arguments(training *t, int argc, char **argv)
         } else if (argv[i][0] != '-' && !t->path) {
             t->path = argv[i];
         } else {
-            fprintf(stderr, "ascc train: %s: unknown, or not with this value\n", argv[i]);
+            ascc_line(stderr, "ascc train: %s: unknown, or not with this value", argv[i]);
             return false;
         }
     }
@@ -572,7 +564,7 @@ int ascc_command_train(int argc, char **argv)
             print_result(&t);
     }
     if (t.error[0])
-        fprintf(stderr, "ascc train: %s\n", t.error);
+        ascc_line(stderr, "ascc train: %s", t.error);
     close_all(&t);
     return good ? 0 : 1;
 }

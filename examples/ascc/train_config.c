@@ -56,11 +56,22 @@ static void text_of(ascc_reader *r, uint32_t object, const char *key, char *into
 
 /* ---- Paths ---------------------------------------------------------------------------------------- */
 
+static bool has_controls(const char *path)
+{
+    for (; *path; path++)
+        if ((unsigned char)*path < 0x20 || *path == 0x7f)
+            return true;
+    return false;
+}
+
 static void join(reading *g, const char *path, char into[ASCC_TRAIN_PATH])
 {
     const char *folder = path[0] == '/' ? "" : g->folder;
     if (!path[0])
         ascc_reader_fail(&g->r, "a path is empty");
+    else if (has_controls(
+                 path)) /* a program that is told of the file would read on in a new line */
+        ascc_reader_fail(&g->r, "a path holds a control character");
     else if (strlen(folder) + strlen(path) + 32 > ASCC_TRAIN_PATH)
         ascc_reader_fail(&g->r, "a path is too long");
     else
@@ -177,7 +188,8 @@ static void read_coarse(ascc_reader *r, uint32_t o, ascc_architecture *a)
     a->levels = integer_or(r, o, "levels", 0, ASCC_ARCHITECTURE_LEVELS, 0);
     a->coarse_layers = integer_or(r, o, "coarse_layers", 1, 16, a->coarse_layers);
     if (a->levels || ascc_reader_has(r, o, "coarse_channels"))
-        ascc_reader_numbers(r, o, "coarse_channels", a->levels, 1.0, ASCC_ARCHITECTURE_CHANNELS, channels);
+        ascc_reader_numbers(r, o, "coarse_channels", a->levels, 1.0, ASCC_ARCHITECTURE_CHANNELS,
+                            channels);
     for (int32_t i = 0; i < a->levels; i++)
         a->coarse_channels[i] = (int32_t)channels[i];
 }

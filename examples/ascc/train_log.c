@@ -141,13 +141,14 @@ void ascc_train_log_close(ascc_train_log *log)
 
 /* ---- The chart ------------------------------------------------------------------------------------ */
 
-static void quoted(FILE *file, const char *text)
+/* A path in gnuplot's quotes. It takes a first '<' or '|' for a command to run, '-' for its own input. */
+static void quoted(FILE *file, const char *path)
 {
-    fputc('\'', file);
-    for (; *text; text++) {
-        if (*text == '\'')
+    fputs(path[0] == '/' ? "'" : "'./", file);
+    for (; *path; path++) {
+        if (*path == '\'')
             fputc('\'', file);
-        fputc(*text, file);
+        fputc(*path, file);
     }
     fputc('\'', file);
 }

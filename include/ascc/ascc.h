@@ -145,7 +145,16 @@ ASCC_API ascc_status ascc_model_load(ascc_context *context, const char *path, as
 ASCC_API ascc_status ascc_model_load_memory(ascc_context *context, const void *data, size_t size,
                                             ascc_model **model);
 
-/** Writes the model's file again, byte for byte as it was read. errors: ARGUMENT, FILE. */
+/**
+ * Writes the model's file again, byte for byte as it was read.
+ *
+ * path      a new file, or one to replace, which lends the new one its mode; links are followed. What is
+ *           no regular file (a folder, a FIFO, a device) is refused.
+ * errors    ARGUMENT, FILE (the context's message has the system's reason and the path).
+ * promise   written beside the path, synced, renamed, the folder synced: whatever happens, the file is the
+ *           old one or the whole new one. After an error it is the old one and nothing is left beside; the
+ *           new one only where the message says that its folder could not be synced.
+ */
 ASCC_API ascc_status ascc_model_save(const ascc_model *model, const char *path);
 
 /** The model's file as bytes, *size of them; the model's, valid as long as it lives. */
@@ -169,7 +178,9 @@ typedef struct ascc_model_info {
     double rest_density;     /* kg/m^3; per metre of depth in 2D */
     double support_radius;   /* m, of the last layer */
     double receptive_radius; /* m: a particle farther away has no influence in one step */
-    const char *name;        /* the model's strings, valid as long as it lives */
+    /* The model's strings, valid as long as it lives, as the file has them: UTF-8 that may hold what a
+     * terminal obeys (messages of the library never do). */
+    const char *name;
     const char *description;
     double time_step_min, time_step_max; /* s: the range of steps that the weights are good for */
     double multiply_adds; /* of one step for each fluid particle, near the middle of a scene */

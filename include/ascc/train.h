@@ -130,8 +130,10 @@ ASCC_API uint64_t ascc_trainer_iteration(const ascc_trainer *trainer);
 /**
  * Everything that the next iterations depend on besides options and sequences: weights, their average,
  * Adam's moments, the iteration. Going on from a saved state gives the bits of never having stopped.
- * save writes beside the path, syncs and renames: a file that is there is complete, whatever happens.
- * errors: FILE (nothing is lost of a file that was there), FORMAT, MISMATCH (of another network), MEMORY.
+ * save promises and refuses what ascc_model_save does. load reads and checks everything before it changes
+ * anything: numbers that are not finite, moments that cannot be, weights that no model may have, an
+ * iteration beyond 2^53 are FORMAT, and the message names the tensor.
+ * errors: FILE, FORMAT, MISMATCH (of another network), MEMORY; after a failed load the trainer is as it was.
  */
 ASCC_API ascc_status ascc_trainer_save(const ascc_trainer *trainer, const char *path);
 ASCC_API ascc_status ascc_trainer_load(ascc_trainer *trainer, const char *path);

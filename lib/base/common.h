@@ -24,8 +24,11 @@ typedef struct ascc_message {
 #define ASCC_PRINTF(text, first)
 #endif
 
-/* Writes the line and returns the status, so that failures read: return ascc_fail(m, status, ...)
- */
+/* What a terminal would obey and not show, and what is no UTF-8, becomes '?'. */
+void ascc_make_printable(char *text);
+
+/* Writes the line, made printable, and returns the status, so that failures read:
+ * return ascc_fail(m, status, ...) */
 ascc_status ascc_fail(ascc_message *message, ascc_status status, const char *format, ...)
     ASCC_PRINTF(3, 4);
 

@@ -38,8 +38,46 @@ int32_t ascc_version(void)
     return ASCC_VERSION_MAJOR * 10000 + ASCC_VERSION_MINOR * 100 + ASCC_VERSION_PATCH;
 }
 
-/* Formats beside the message first: an argument may be the message itself. What is not printable in
- * ASCII (a path may hold a newline) becomes '?', except bytes of UTF-8. */
+/* ---- Text that a terminal may have ------------------------------------------------------------- */
+
+/* Characters that move the cursor, end the line or turn the direction of writing. */
+static bool controls(uint32_t code)
+{
+    return code < 0x20 || (code >= 0x7f && code < 0xa0) || code == 0x61c || code == 0x200e ||
+           code == 0x200f || (code >= 0x2028 && code <= 0x202e) ||
+           (code >= 0x2066 && code <= 0x2069);
+}
+
+/* Bytes of the well-formed UTF-8 character at c, if it controls nothing; else 0. */
+static size_t printable(const unsigned char *c)
+{
+    static const uint32_t least[] = {0, 0, 0x80, 0x800, 0x10000}; /* by length */
+    if (c[0] < 0x80)
+        return controls(c[0]) ? 0 : 1;
+    const size_t length = c[0] < 0xc2 ? 0 : c[0] < 0xe0 ? 2 : c[0] < 0xf0 ? 3 : c[0] < 0xf5 ? 4 : 0;
+    uint32_t code = c[0] & (0x7fu >> length);
+    for (size_t i = 1; i < length; i++) {
+        if ((c[i] & 0xc0) != 0x80)
+            return 0;
+        code = code << 6 | (c[i] & 0x3fu);
+    }
+    if (code < least[length] || code > 0x10ffff || (code >= 0xd800 && code < 0xe000))
+        return 0;
+    return controls(code) ? 0 : length;
+}
+
+void ascc_make_printable(char *text)
+{
+    unsigned char *c = (unsigned char *)text;
+    while (*c != '\0') {
+        const size_t length = printable(c);
+        if (length == 0)
+            *c = '?';
+        c += length ? length : 1;
+    }
+}
+
+/* Formats beside the message first: an argument may be the message itself. */
 ascc_status ascc_fail(ascc_message *message, ascc_status status, const char *format, ...)
 {
     char text[ASCC_MESSAGE_CAPACITY];
@@ -48,11 +86,7 @@ ascc_status ascc_fail(ascc_message *message, ascc_status status, const char *for
     if (vsnprintf(text, sizeof text, format, arguments) < 0)
         text[0] = '\0';
     va_end(arguments);
-    for (char *c = text; *c != '\0'; c++) {
-        const unsigned char byte = (unsigned char)*c;
-        if (byte < 0x20 || byte == 0x7f)
-            *c = '?';
-    }
+    ascc_make_printable(text); /* a path may hold anything, and the end may be cut */
     memcpy(message->text, text, sizeof text);
     return status;
 }

@@ -3,6 +3,7 @@
 #include "cost.h"
 #include "description.h"
 #include "file/safetensors.h"
+#include "file/write_file.h"
 
 #include <math.h>
 #include <stdatomic.h>
@@ -221,15 +222,10 @@ ascc_status ascc_model_save(const ascc_model *model, const char *path)
         ascc_fail(&message, ASCC_ERROR_ARGUMENT, "model: a NULL argument");
         return ascc_context_fail(model->context, ASCC_ERROR_ARGUMENT, &message);
     }
-    FILE *file = fopen(path, "wb");
-    bool written = file != NULL;
-    if (file) {
-        written = fwrite(model->bytes, 1, model->byte_count, file) == model->byte_count;
-        written = fclose(file) == 0 && written;
-    }
-    if (written)
+    const ascc_bytes bytes = {model->bytes, model->byte_count};
+    if (ascc_write_file(path, &bytes, 1, &message) == ASCC_OK)
         return ASCC_OK;
-    ascc_fail(&message, ASCC_ERROR_FILE, "model: cannot write '%s'", path);
+    ascc_fail(&message, ASCC_ERROR_FILE, "model: %s", message.text);
     return ascc_context_fail(model->context, ASCC_ERROR_FILE, &message);
 }
 

@@ -3,29 +3,36 @@
 #include <errno.h>
 #include <inttypes.h>
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
-#include <unistd.h>
 
+#include "file/write_file.h"
 #include "trainer.h"
 
 #define FAIL(status, ...) ascc_fail(&t->message, status, __VA_ARGS__)
 
 /* The arrays of one block, in its order. */
+enum { WEIGHTS, AVERAGE, MOMENT1, MOMENT2, ARRAYS };
 static const char *const names[] = {"weights", "average", "moment1", "moment2"};
+
+#define MAX_ITERATION ((uint64_t)1 << 53)
+
+/* The model file of these weights, in bytes[byte_count] that hold its header. */
+static void fill_model(const ascc_trainer *t, const float *weights, unsigned char *bytes)
+{
+    for (size_t i = 0; i < t->tensor_count; i++)
+        memcpy(bytes + (t->file.tensor[i].data - t->bytes), weights + t->tensor[i].first,
+               t->tensor[i].count * sizeof(float));
+}
 
 const void *ascc_trainer_model(ascc_trainer *t, int32_t averaged, size_t *size)
 {
     if (!ascc_trainer_alive(t) || !size)
         return NULL;
     const bool average = averaged && t->options.average > 0.0;
-    ascc_safetensors *file = average ? &t->averaged_file : &t->file;
-    for (size_t i = 0; i < t->tensor_count; i++)
-        memcpy((unsigned char *)file->tensor[i].data,
-               (average ? t->average : t->weights) + t->tensor[i].first,
-               t->tensor[i].count * sizeof(float));
+    unsigned char *bytes = average ? t->averaged_bytes : t->bytes;
+    fill_model(t, average ? t->average : t->weights, bytes);
     *size = t->byte_count;
-    return average ? t->averaged_bytes : t->bytes;
+    return bytes;
 }
 
 /* Of the network, whatever its weights: FNV-1a of the file's header. */
@@ -37,15 +44,20 @@ static uint64_t network_hash(const ascc_trainer *t)
     return hash;
 }
 
-static bool write_state(const ascc_trainer *t, FILE *file)
+/* ---- Saving ---- */
+
+ascc_status ascc_trainer_save(const ascc_trainer *trainer, const char *path)
 {
+    if (!ascc_trainer_alive(trainer) || !path)
+        return ASCC_ERROR_ARGUMENT;
+    ascc_trainer *t = (ascc_trainer *)trainer; /* a failure's message is the one change */
     char header[1024];
     const size_t bytes = t->parameter_count * sizeof(float);
     int length = snprintf(header, sizeof header,
                           "{\"__metadata__\":{\"format\":\"ascc.trainer\",\"version\":\"1\","
                           "\"iteration\":\"%" PRIu64 "\",\"network\":\"%016" PRIx64 "\"}",
                           t->iteration, network_hash(t));
-    for (size_t i = 0; i < 4; i++)
+    for (size_t i = 0; i < ARRAYS; i++)
         length += snprintf(header + length, sizeof header - (size_t)length,
                            ",\"%s\":{\"dtype\":\"F32\",\"shape\":[%zu],\"data_offsets\":[%zu,%zu]}",
                            names[i], t->parameter_count, i * bytes, (i + 1) * bytes);
@@ -55,71 +67,119 @@ static bool write_state(const ascc_trainer *t, FILE *file)
     unsigned char size[8];
     for (int i = 0; i < 8; i++)
         size[i] = (unsigned char)((uint64_t)length >> (8 * i));
-    return fwrite(size, 1, 8, file) == 8 &&
-           fwrite(header, 1, (size_t)length, file) == (size_t)length &&
-           fwrite(t->weights, sizeof(float), 4 * t->parameter_count, file) ==
-               4 * t->parameter_count &&
-           fflush(file) == 0 && fsync(fileno(file)) == 0;
+    const ascc_bytes piece[] = {
+        {size, sizeof size}, {header, (size_t)length}, {t->weights, ARRAYS * bytes}};
+    return ascc_write_file(path, piece, sizeof piece / sizeof *piece, &t->message);
 }
 
-ascc_status ascc_trainer_save(const ascc_trainer *trainer, const char *path)
+/* ---- Loading ---- */
+
+/* Digits alone. 2^53 is beyond all training, and a log counts in doubles. */
+static bool read_iteration(const char *text, uint64_t *iteration)
 {
-    if (!ascc_trainer_alive(trainer) || !path)
-        return ASCC_ERROR_ARGUMENT;
-    ascc_trainer *t = (ascc_trainer *)trainer; /* a failure's message is the one change */
-    const size_t length = strlen(path) + 5;
-    char *beside = ascc_allocate(&t->allocator, length, 1);
-    if (!beside)
-        return FAIL(ASCC_ERROR_MEMORY, "no memory to save");
-    snprintf(beside, length, "%s.tmp", path);
-    errno = 0;
-    FILE *file = fopen(beside, "wb");
-    bool good = file && write_state(t, file);
-    int why = errno;
-    if (file && fclose(file) != 0 && good) {
-        good = false;
-        why = errno;
-    }
-    if (good && rename(beside, path) != 0) {
-        good = false;
-        why = errno;
-    }
-    if (!good && file)
-        remove(beside);
-    ascc_release(&t->allocator, beside, length, 1);
-    if (!good)
-        return FAIL(ASCC_ERROR_FILE, "cannot write '%s': %s", path, strerror(why));
-    return ASCC_OK;
+    uint64_t value = 0;
+    const char *c = text;
+    for (; *c >= '0' && *c <= '9' && value <= MAX_ITERATION; c++)
+        value = 10 * value + (uint64_t)(*c - '0');
+    *iteration = value;
+    return c != text && *c == '\0' && value <= MAX_ITERATION;
 }
 
-static ascc_status read_state(ascc_trainer *t, const char *path, ascc_safetensors *file)
+static ascc_status check_metadata(ascc_trainer *t, const char *path, ascc_safetensors *file,
+                                  uint64_t *iteration)
 {
     const char *format = ascc_safetensors_metadata(file, "format");
     const char *version = ascc_safetensors_metadata(file, "version");
-    const char *iteration = ascc_safetensors_metadata(file, "iteration");
+    const char *count = ascc_safetensors_metadata(file, "iteration");
     const char *network = ascc_safetensors_metadata(file, "network");
+    char own[20];
     if (!format || strcmp(format, "ascc.trainer") != 0 || !version || strcmp(version, "1") != 0 ||
-        !iteration || !network)
+        !count || !network)
         return FAIL(ASCC_ERROR_FORMAT, "'%s' is not the state of a trainer", path);
-    if (strtoull(network, NULL, 16) != network_hash(t))
+    (void)snprintf(own, sizeof own, "%016" PRIx64, network_hash(t));
+    if (strcmp(network, own) != 0)
         return FAIL(ASCC_ERROR_MISMATCH, "'%s' is the state of another network", path);
-    for (size_t i = 0; i < 4; i++) {
-        const int32_t k = ascc_safetensors_find(file, names[i]);
-        if (k < 0 || file->tensor[k].count != t->parameter_count)
-            return FAIL(ASCC_ERROR_FORMAT, "'%s': tensor '%s' is missing or of another size", path,
-                        names[i]);
-        if (strcmp(file->tensor[k].type, "F32") != 0)
-            return FAIL(ASCC_ERROR_FORMAT, "'%s': tensor '%s' is not F32", path, names[i]);
-    }
-    for (size_t i = 0; i < 4; i++)
-        memcpy(t->weights + i * t->parameter_count,
-               file->tensor[ascc_safetensors_find(file, names[i])].data,
-               t->parameter_count * sizeof(float));
-    t->iteration = strtoull(iteration, NULL, 10);
-    t->changed = false;
-    t->in_vain = t->deaf = 0;
-    ascc_trainer_apply(t);
+    if (!read_iteration(count, iteration))
+        return FAIL(ASCC_ERROR_FORMAT, "'%s': iteration '%s' is none", path,
+                    ascc_quote(count).text);
     return ASCC_OK;
+}
+
+/* values[parameter_count] = the array of that name. */
+static ascc_status read_array(ascc_trainer *t, const char *path, const ascc_safetensors *file,
+                              const char *name, float *values)
+{
+    ascc_message why = {""};
+    const int32_t k = ascc_safetensors_find(file, name);
+    if (k < 0 || file->tensor[k].count != t->parameter_count)
+        return FAIL(ASCC_ERROR_FORMAT, "'%s': tensor '%s' is missing or of another size", path,
+                    name);
+    if (strcmp(file->tensor[k].type, "F32") != 0)
+        return FAIL(ASCC_ERROR_FORMAT, "'%s': tensor '%s' is not F32", path, name);
+    if (ascc_tensor_read_floats(&file->tensor[k], values, &why) != ASCC_OK)
+        return FAIL(ASCC_ERROR_FORMAT, "'%s': %s", path, why.text);
+    return ASCC_OK;
+}
+
+/* Weights that no model may have are none of a state either. */
+static ascc_status check_weights(ascc_trainer *t, const char *path, const char *name,
+                                 const float *weights)
+{
+    ascc_model *model = NULL;
+    unsigned char *bytes = ascc_allocate(&t->allocator, t->byte_count, 1);
+    if (!bytes)
+        return FAIL(ASCC_ERROR_MEMORY, "no memory to check '%s'", path);
+    memcpy(bytes, t->bytes, t->byte_count);
+    fill_model(t, weights, bytes);
+    ascc_status status = ascc_model_load_memory(t->context, bytes, t->byte_count, &model);
+    ascc_release(&t->allocator, bytes, t->byte_count, 1);
+    ascc_model_destroy(&model);
+    if (status != ASCC_OK) {
+        char why[ASCC_MESSAGE_CAPACITY];
+        (void)ascc_context_message(t->context, why, sizeof why);
+        FAIL(status, "'%s': tensor '%s': %s", path, name, why);
+    }
+    return status;
+}
+
+/* state[ARRAYS][parameter_count] = the file's, if training can go on from it. */
+static ascc_status read_arrays(ascc_trainer *t, const char *path, const ascc_safetensors *file,
+                               float *state)
+{
+    const size_t n = t->parameter_count;
+    ascc_status status = ASCC_OK;
+    for (size_t i = 0; i < ARRAYS && status == ASCC_OK; i++)
+        status = read_array(t, path, file, names[i], state + i * n);
+    for (size_t i = 0; i < n && status == ASCC_OK; i++)
+        if (state[MOMENT2 * n + i] < 0.0f)
+            status = FAIL(ASCC_ERROR_FORMAT, "'%s': tensor '%s': value %zu is negative", path,
+                          names[MOMENT2], i);
+    for (size_t i = 0; i < MOMENT1 && status == ASCC_OK; i++)
+        status = check_weights(t, path, names[i], state + i * n);
+    return status;
+}
+
+/* Everything is read and checked before anything changes. */
+static ascc_status read_state(ascc_trainer *t, const char *path, ascc_safetensors *file)
+{
+    uint64_t iteration = 0;
+    ascc_status status = check_metadata(t, path, file, &iteration);
+    if (status != ASCC_OK)
+        return status;
+    const size_t count = ARRAYS * t->parameter_count;
+    float *state = ascc_allocate(&t->allocator, count, sizeof *state);
+    if (!state)
+        return FAIL(ASCC_ERROR_MEMORY, "no memory to read '%s'", path);
+    status = read_arrays(t, path, file, state);
+    if (status == ASCC_OK) {
+        memcpy(t->weights, state, count * sizeof *state);
+        t->iteration = iteration;
+        t->changed = false;
+        t->in_vain = t->deaf = 0;
+        ascc_trainer_apply(t);
+    }
+    ascc_release(&t->allocator, state, count, sizeof *state);
+    return status;
 }
 
 ascc_status ascc_trainer_load(ascc_trainer *t, const char *path)

@@ -186,6 +186,13 @@ static ascc_status open_model(ascc_trainer *t, const void *model, size_t size)
     return find_tensors(t);
 }
 
+/* Why there is no trainer, where the options have room for it. */
+static void tell(const ascc_trainer_options *options, const char *why)
+{
+    if (options->size >= sizeof *options && options->message && options->message_size)
+        snprintf(options->message, options->message_size, "%s", why);
+}
+
 ascc_status ascc_trainer_create(const ascc_trainer_options *options, const void *model,
                                 size_t model_size, ascc_trainer **trainer)
 {
@@ -195,8 +202,10 @@ ascc_status ascc_trainer_create(const ascc_trainer_options *options, const void 
         return ASCC_ERROR_ARGUMENT;
     const ascc_allocator allocator = ascc_allocator_default();
     ascc_trainer *t = ascc_allocate(&allocator, 1, sizeof *t);
-    if (!t)
+    if (!t) {
+        tell(options, "no memory for the trainer");
         return ASCC_ERROR_MEMORY;
+    }
     memset(t, 0, sizeof *t);
     t->magic = ASCC_TRAINER_MAGIC;
     t->allocator = allocator;
@@ -208,8 +217,7 @@ ascc_status ascc_trainer_create(const ascc_trainer_options *options, const void 
     if (status == ASCC_ERROR_MEMORY)
         ascc_fail(&t->message, status, "no memory for the trainer");
     if (status != ASCC_OK) {
-        if (options->size >= sizeof *options && options->message && options->message_size)
-            snprintf(options->message, options->message_size, "%s", t->message.text);
+        tell(options, t->message.text);
         ascc_trainer_destroy(&t);
         return status;
     }

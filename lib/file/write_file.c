@@ -1,0 +1,255 @@
+/* Writes a file whole or not at all: beside its place, synced, renamed.
+ * SPDX-License-Identifier: MIT */
+#include "write_file.h"
+
+#include <errno.h>
+#include <fcntl.h>
+#include <stdio.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#define PATH_SIZE 4096
+#define MAX_LINKS 40
+#define MAX_TRIES 1000
+#define MAX_WRITE ((size_t)1 << 30) /* bytes that every system takes at once */
+#define SHOWN_PATH 140              /* bytes of a path that leave room for the reason */
+
+/* The systems differ here alone. */
+#if defined(_WIN32)
+#include <windows.h>
+#define NEW_FILE (O_WRONLY | O_CREAT | O_EXCL | O_BINARY)
+#define OUR_MODE (S_IREAD | S_IWRITE)
+
+static bool follow_links(char path[PATH_SIZE])
+{
+    (void)path;
+    return true;
+}
+
+static void set_mode(int file, unsigned mode)
+{
+    (void)file;
+    (void)mode;
+}
+
+static int sync_file(int file)
+{
+    return _commit(file);
+}
+
+/* The name is on disk when the call returns: there is no folder to sync. */
+static bool open_folder(const char *path, int *folder)
+{
+    (void)path;
+    *folder = -1;
+    return true;
+}
+
+static bool replace(const char *part, const char *path)
+{
+    if (MoveFileExA(part, path, MOVEFILE_REPLACE_EXISTING | MOVEFILE_WRITE_THROUGH))
+        return true;
+    errno = GetLastError() == ERROR_ACCESS_DENIED ? EACCES : EIO;
+    return false;
+}
+#else
+#define NEW_FILE (O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC | O_NOFOLLOW)
+#define OUR_MODE 0666
+
+/* Path of what a chain of links leads to, which need not be there. */
+static bool follow_links(char path[PATH_SIZE])
+{
+    char link[PATH_SIZE];
+    for (int i = 0; i < MAX_LINKS; i++) {
+        const ssize_t read = readlink(path, link, sizeof link);
+        if (read < 0)
+            return true; /* no link; or not there, or not to be reached, which opening will tell */
+        const size_t length = (size_t)read;
+        const char *slash = strrchr(path, '/');
+        const size_t folder = link[0] == '/' || !slash ? 0 : (size_t)(slash - path) + 1;
+        if (folder + length >= PATH_SIZE) {
+            errno = ENAMETOOLONG;
+            return false;
+        }
+        memcpy(path + folder, link, length);
+        path[folder + length] = '\0';
+    }
+    errno = ELOOP;
+    return false;
+}
+
+/* Where the mode cannot be set, that of the creation is narrower. */
+static void set_mode(int file, unsigned mode)
+{
+    (void)fchmod(file, (mode_t)mode);
+}
+
+static int sync_file(int file)
+{
+    return fsync(file);
+}
+
+/* *folder = -1 for one that may be written but not read: it cannot be synced. */
+static bool open_folder(const char *path, int *folder)
+{
+    do
+        *folder = open(path, O_RDONLY | O_CLOEXEC);
+    while (*folder < 0 && errno == EINTR);
+    return *folder >= 0 || errno == EACCES;
+}
+
+static bool replace(const char *part, const char *path)
+{
+    return rename(part, path) == 0;
+}
+#endif
+
+typedef struct place {
+    char path[PATH_SIZE];   /* of the file, links followed */
+    char folder[PATH_SIZE]; /* that it lies in */
+    char part[PATH_SIZE];   /* where it is written */
+    unsigned mode;          /* of the file that is there */
+    bool there;
+} place;
+
+/* Is there room for a file? Sets errno, or *why, when there is not. */
+static bool find_place(place *p, const char *path, const char **why)
+{
+    if (strlen(path) >= sizeof p->path) {
+        errno = ENAMETOOLONG;
+        return false;
+    }
+    strcpy(p->path, path);
+    struct stat about;
+    p->there = stat(path, &about) == 0;
+    if (p->there && S_ISDIR(about.st_mode)) {
+        errno = EISDIR;
+        return false;
+    }
+    if (p->there && !S_ISREG(about.st_mode)) {
+        *why = "it is no regular file";
+        errno = 0;
+        return false;
+    }
+    p->mode = p->there ? about.st_mode & 0777u : 0u;
+    if (!follow_links(p->path) || (p->there && access(path, W_OK) != 0))
+        return false;
+    const char *slash = strrchr(p->path, '/');
+    const int length = slash ? (int)(slash - p->path) : 0;
+    (void)snprintf(p->folder, sizeof p->folder, "%.*s", length, p->path);
+    if (!length)
+        strcpy(p->folder, slash ? "/" : ".");
+    return true;
+}
+
+/* A new file beside, under a name that nobody else has. */
+static int open_part(place *p)
+{
+    const char *slash = strrchr(p->path, '/');
+    const char *name = slash ? slash + 1 : p->path;
+    for (int i = 0; i < MAX_TRIES; i++) {
+        const int length = snprintf(p->part, sizeof p->part, "%s/%.200s.%ld.%d.part", p->folder,
+                                    name, (long)getpid(), i);
+        if (length < 0 || (size_t)length >= sizeof p->part) {
+            errno = ENAMETOOLONG;
+            return -1;
+        }
+        const int file = open(p->part, NEW_FILE, p->there ? (int)p->mode : OUR_MODE);
+        if (file >= 0 || (errno != EEXIST && errno != EINTR))
+            return file;
+    }
+    return -1;
+}
+
+static bool write_piece(int file, const ascc_bytes *piece)
+{
+    const unsigned char *at = piece->data;
+    size_t left = piece->size;
+    while (left > 0) {
+        const ssize_t written = write(file, at, ascc_min_size(left, MAX_WRITE));
+        if (written < 0 && errno == EINTR)
+            continue;
+        if (written <= 0) {
+            errno = written < 0 ? errno : EIO;
+            return false;
+        }
+        at += written;
+        left -= (size_t)written;
+    }
+    return true;
+}
+
+static bool synced(int file)
+{
+    int result;
+    do
+        result = sync_file(file);
+    while (result != 0 && errno == EINTR);
+    return result == 0;
+}
+
+/* Writes, syncs and closes. What was synced is not lost by a close that was interrupted. */
+static bool fill(int file, const ascc_bytes *piece, size_t count)
+{
+    bool good = true;
+    for (size_t i = 0; good && i < count; i++)
+        good = write_piece(file, &piece[i]);
+    good = good && synced(file);
+    const int why = errno;
+    const bool closed = close(file) == 0 || errno == EINTR;
+    if (!good)
+        errno = why;
+    return good && closed;
+}
+
+/* Renames, so that the name too outlives a loss of power. Some file systems sync no folder: EINVAL. */
+static bool put_in_place(const place *p, const char **why)
+{
+    int folder;
+    if (!open_folder(p->folder, &folder))
+        return false;
+    bool good = replace(p->part, p->path);
+    int reason = errno;
+    if (good && folder >= 0 && !synced(folder) && errno != EINVAL) {
+        reason = errno;
+        good = false;
+        *why = "it is written, but its folder is not synced";
+    }
+    if (folder >= 0)
+        (void)close(folder);
+    errno = reason;
+    return good;
+}
+
+static bool write_file(const char *path, const ascc_bytes *piece, size_t count, const char **why)
+{
+    place p;
+    if (!find_place(&p, path, why))
+        return false;
+    const int file = open_part(&p);
+    if (file < 0)
+        return false;
+    if (p.there)
+        set_mode(file, p.mode);
+    if (fill(file, piece, count) && put_in_place(&p, why))
+        return true;
+    const int reason = errno;
+    (void)unlink(p.part); /* not there any more if it has its place */
+    errno = reason;
+    return false;
+}
+
+ascc_status ascc_write_file(const char *path, const ascc_bytes *piece, size_t count,
+                            ascc_message *message)
+{
+    const char *why = NULL;
+    errno = 0;
+    if (write_file(path, piece, count, &why))
+        return ASCC_OK;
+    const char *reason = errno ? strerror(errno) : "";
+    const size_t length = strlen(path);
+    const size_t skipped = length > SHOWN_PATH ? length - SHOWN_PATH : 0;
+    return ascc_fail(message, ASCC_ERROR_FILE, "cannot write '%s%s': %s%s%s", skipped ? "..." : "",
+                     path + skipped, why ? why : "", why && errno ? ": " : "", reason);
+}
