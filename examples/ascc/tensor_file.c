@@ -68,6 +68,26 @@ const char *ascc_tensor_file_metadata(const json_t *header, const char *key)
     return json_string_value(json_object_get(json_object_get(header, "__metadata__"), key));
 }
 
+unsigned char *ascc_tensor_file_build(const json_t *header, const void *data, size_t data_size,
+                                      size_t *size)
+{
+    const size_t length = json_dumpb(header, NULL, 0, JSON_COMPACT);
+    const size_t padded = (length + 7) & ~(size_t)7;
+    unsigned char *bytes = length ? malloc(8 + padded + data_size) : NULL;
+    if (!bytes)
+        return NULL;
+    for (int i = 0; i < 8; i++)
+        bytes[i] = (unsigned char)((uint64_t)padded >> 8 * i);
+    memset(bytes + 8, ' ', padded);
+    if (json_dumpb(header, (char *)bytes + 8, padded, JSON_COMPACT) != length) {
+        free(bytes);
+        return NULL;
+    }
+    memcpy(bytes + 8 + padded, data, data_size);
+    *size = 8 + padded + data_size;
+    return bytes;
+}
+
 char *ascc_tensor_file_harmless(char *text)
 {
     for (char *c = text; *c; c++)

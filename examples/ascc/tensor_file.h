@@ -20,6 +20,10 @@ json_t *ascc_tensor_file_header(const unsigned char *bytes, size_t size, size_t 
 /* A text of the metadata; NULL = none. */
 const char *ascc_tensor_file_metadata(const json_t *header, const char *key);
 
+/* A file of this header and data[data_size]: from malloc, NULL = no memory. */
+unsigned char *ascc_tensor_file_build(const json_t *header, const void *data, size_t data_size,
+                                      size_t *size);
+
 /* Makes text from a file fit for a terminal: what is no printable ASCII becomes '?'. Returns text. */
 char *ascc_tensor_file_harmless(char *text);
 
