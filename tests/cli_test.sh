@@ -129,7 +129,7 @@ holds 'nothing else is written' [ ! -e o ]
 run sim demo dam-break-2d --size 8 -n 20 --every 10 -o a.safetensors --frames png --ply ply
 report $? 'the demonstration model runs in 2D'
 holds 'the table has particles, phases and energy' sh -c '
-    grep -q "^particles  *32 fluid" out && grep -q "^  last layer .* ms a step" out &&
+    grep -q "^particles  *32 fluid" out && grep -q "^  pairs  *.* ms a step" out &&
         grep -q "^energy " out'
 holds 'the momentum error is exactly zero' grep -q '^momentum error  *0  (0 0 0 quanta' out
 holds 'and says why angular momentum is not measured' grep -q '^angular mom. error  *not measured' out
