@@ -10,8 +10,8 @@
 #include <string.h>
 #include <unistd.h>
 
+#include "../examples/ascc/host.h"
 #include "../examples/ascc/scenes.h"
-#include "../examples/demo_model.h"
 #include "../tests/support/model_builder.h"
 #include "bench.h"
 #include "model/model.h"
@@ -61,7 +61,6 @@ static unsigned char *tiny_model(int32_t dimension, size_t *size)
 /* False when a published network is not there. */
 static bool load_model(const bench_options *o, const char *name, int32_t dimension, subject *s)
 {
-    const bool demo = strcmp(name, "demo") == 0, tiny = strcmp(name, "tiny") == 0;
     char published[1024];
     const char *path = name;
     if (strcmp(name, "dmcf") == 0 || strcmp(name, "cconv") == 0) {
@@ -72,18 +71,16 @@ static bool load_model(const bench_options *o, const char *name, int32_t dimensi
             return false;
     }
     ascc_status status;
-    if (demo || tiny) {
+    ascc_host_error why = {""};
+    if (strcmp(name, "tiny") == 0) {
         size_t size;
-        unsigned char *bytes =
-            demo ? demo_model_bytes(dimension, BENCH_SPACING, &size) : tiny_model(dimension, &size);
+        unsigned char *bytes = tiny_model(dimension, &size);
         status = ascc_model_load_memory(s->context, bytes, size, &s->model);
         free(bytes);
     } else
-        status = ascc_model_load(s->context, path, &s->model);
-    char text[256] = "";
-    (void)ascc_context_message(s->context, text, sizeof text);
+        status = ascc_host_model(s->context, path, dimension, BENCH_SPACING, &s->model, &why);
     if (status != ASCC_OK)
-        bench_fail("model %s: %s", name, text);
+        bench_fail("model %s: %s", name, why.text);
     s->info.size = sizeof s->info;
     (void)ascc_model_get_info(s->model, &s->info);
     return true;

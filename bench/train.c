@@ -5,6 +5,7 @@
 
 #include <ascc/train.h>
 
+#include "../examples/ascc/host.h"
 #include "../tests/support/model_builder.h"
 #include "bench.h"
 
@@ -41,8 +42,9 @@ static void open_lesson(lesson *s, const bench_options *o, size_t count)
     memset(s, 0, sizeof *s);
     s->context = bench_context(o->cpu, 1);
     ascc_status status;
+    ascc_host_error why;
     if (o->model)
-        status = ascc_model_load(s->context, o->model, &s->model);
+        status = ascc_host_load(s->context, o->model, &s->model, &why);
     else {
         unsigned char *bytes = model_builder_tiny(BENCH_SPACING, &size);
         status = ascc_model_load_memory(s->context, bytes, size, &s->model);

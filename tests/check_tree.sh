@@ -41,8 +41,8 @@ check 'lib includes only itself and libc' "$(
     grep -nE '# *include *<' $sources | grep -vE '^lib/train/.*<ascc/train\.h>' | grep -vE "<($libc)\.h>|<ascc/ascc\.h>|ascc/version\.h")"
 check 'model files know nothing of points, points nothing of models' "$(
     grep -nE '# *include *"(particles|neighbors|resample|hierarchy)\.h"' lib/model.[ch] lib/plan.[ch] \
-        lib/description.[ch] lib/safetensors.[ch] lib/published.[ch] lib/json*.[ch]
-    grep -nE '# *include *"(plan|safetensors|description|published|network|integrate|step)\.h"' \
+        lib/description.[ch] lib/safetensors.[ch] lib/json*.[ch]
+    grep -nE '# *include *"(plan|safetensors|description|network|integrate|step)\.h"' \
         lib/particles.[ch] lib/neighbors.[ch] lib/resample.[ch] lib/snapshot.c)"
 pattern='(^|[^a-z_.>])(malloc|calloc|realloc|aligned_alloc|posix_memalign|free) *\('
 check 'only memory.c calls the allocator' "$(code $(echo "$sources" | grep -v '^lib/memory\.c$'))"

@@ -86,10 +86,45 @@ words='sim demo dam-break-2d --size 6'
     refuses 1 "longer than the file" sim demo text -n 1
 }
 
-for option in help --help version --version 'sim --help' 'info --help'; do
+for option in help --help version --version 'sim --help' 'info --help' 'convert --help'; do
     # shellcheck disable=SC2086
     holds "ascc $option says something on stdout" sh -c '"$0" $1 | grep -q ascc' "$ascc" "$option"
 done
+
+# A small network as the published ones are described: an input of the fuzzer's, behind its first byte.
+tail -c +2 "$root/tests/fuzz/corpus/cconv-f" >published
+run convert published -o m.safetensors
+report $? 'a published network is converted'
+holds 'and says what it became' grep -q '^m.safetensors: model small, 221 parameters$' out
+holds 'info tells the same of both' sh -c '
+    "$0" info published | tail -n +2 >a && "$0" info m.safetensors | tail -n +2 >b && cmp a b' "$ascc"
+# Behind the header, which names the model.
+holds 'both run to the same bytes' sh -c '
+    "$0" sim published dam-break-3d --size 5 -n 3 -o p &&
+        "$0" sim m.safetensors dam-break-3d --size 5 -n 3 -o q &&
+        tail -c +8193 p >a && tail -c +8193 q >b && [ -s a ] && cmp a b' "$ascc"
+refuses 2 "usage: ascc convert IN -o OUT" convert
+refuses 2 "usage: ascc convert IN -o OUT" convert published
+refuses 2 "usage: ascc convert IN -o OUT" convert published more -o o
+refuses 1 "none: No such file" convert none -o o
+refuses 1 ".: is no regular file" convert . -o o
+refuses 1 "text: the header of" convert text -o o
+refuses 1 "'format' is 'ascc.model', not 'ascc.weights'" convert m.safetensors -o o
+refuses 1 "published: is the network that is to be converted" convert published -o published
+ln -s published link
+refuses 1 "link: is the network that is to be converted" convert published -o link
+refuses 1 "cannot write '/nowhere/o'" convert published -o /nowhere/o
+LC_ALL=C sed 's/poly6/poly7/' published >unknown
+refuses 1 "architecture 'conv': 'window' is not understood: 'poly7" convert unknown -o m.safetensors
+refuses 1 "'window' is not understood: 'poly7" sim unknown dam-break-3d -n 1
+refuses 1 "'window' is not understood: 'poly7" info unknown
+LC_ALL=C sed 's/, dim 3/, dim 2/' published >flat
+refuses 1 "'network' and 'dim' contradict each other" convert flat -o m.safetensors
+holds 'what is refused leaves the old file as it was' "$ascc" info m.safetensors
+echo old >old
+run convert published -o old
+holds 'a file that is there is replaced' cmp old m.safetensors
+holds 'nothing else is written' [ ! -e o ]
 
 run sim demo dam-break-2d --size 8 -n 20 --every 10 -o a.safetensors --frames png --ply ply
 report $? 'the demonstration model runs in 2D'

@@ -53,11 +53,10 @@ static void every_input_of_the_corpus_is_survived(void **state)
     assert_true(count >= 18);
 }
 
-static void check_every_changed_byte(const model_random *random)
+/* Frees the file. */
+static void check_every_changed_byte(unsigned char *file, size_t size)
 {
     static const uint8_t changes[] = {0x00, 0xff, '"', '{', '9'};
-    size_t size;
-    unsigned char *file = model_builder_random(random, &size);
     uint8_t *input = malloc(size + 1);
     assert_non_null(input);
     input[0] = 'f';
@@ -80,8 +79,19 @@ static void every_changed_byte_of_a_file_is_survived(void **state)
     const model_random grid = {.channels = 4, .cells = 1, .output_cells = 2, .trunk_layers = 1};
     const model_random basis = {
         .channels = 4, .trunk_layers = 1, .bumps = 1, .levels = 2, .transfer = 2, .type = "F16"};
-    check_every_changed_byte(&grid);
-    check_every_changed_byte(&basis);
+    size_t size;
+    unsigned char *file = model_builder_random(&grid, &size);
+    check_every_changed_byte(file, size);
+    file = model_builder_random(&basis, &size);
+    check_every_changed_byte(file, size);
+}
+
+static void every_changed_byte_of_a_published_network_is_survived(void **state)
+{
+    (void)state;
+    size_t size;
+    unsigned char *file = model_builder_dmcf(NULL, NULL, &size);
+    check_every_changed_byte(file, size);
 }
 
 int main(void)
@@ -89,6 +99,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(every_input_of_the_corpus_is_survived),
         cmocka_unit_test(every_changed_byte_of_a_file_is_survived),
+        cmocka_unit_test(every_changed_byte_of_a_published_network_is_survived),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

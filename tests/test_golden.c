@@ -6,6 +6,7 @@
 #include "model/model.h"
 #include "network/pair_sum.h"
 #include "points/resample.h"
+#include "host.h"
 #include "support/golden.h"
 
 #define LAYER_TOLERANCE 2e-5 /* of the layer's largest value */
@@ -314,11 +315,10 @@ static bool network_open(network_case *n, const char *model, const char *scene, 
         return false;
     assert_int_equal(ascc_context_create(NULL, &n->context), ASCC_OK);
     snprintf(name, sizeof name, "weights/%s-liquid3d.safetensors", model);
-    if (ascc_model_load(n->context, shared_path(path, sizeof path, name), &n->model) != ASCC_OK) {
-        char text[256];
-        ascc_context_message(n->context, text, sizeof text);
-        fail_msg("%s: %s", path, text);
-    }
+    ascc_host_error why;
+    if (ascc_host_load(n->context, shared_path(path, sizeof path, name), &n->model, &why) !=
+        ASCC_OK)
+        fail_msg("%s: %s", path, why.text);
     size_t count;
     n->fluid = golden_values(&n->g, "fluid.position", &count);
     n->velocity = golden_values(&n->g, "fluid.velocity", NULL);

@@ -268,6 +268,20 @@ run train log.json --iterations 2
 [ $? -eq 1 ] && grep -q 'ascc train: /dev/full: ' err
 report $? 'a log that cannot be written is an error'
 
+# ---- A published network ----
+
+tail -c +2 "$source/tests/fuzz/corpus/cconv-f" >published
+run sim published dam-break-3d --size 5 -n 8 -o fall.safetensors
+cat >published.json <<'END'
+{"model": "published", "data": {"train": ["fall.safetensors"]}, "output": "learned.safetensors",
+ "stages": [{"iterations": 2, "horizon": 1, "learning_rate": 0.001}]}
+END
+run train published.json
+[ $? -eq 0 ] && "$ascc" info learned.safetensors | grep -q 'model small'
+report $? 'a published network can be trained on'
+LC_ALL=C sed 's/poly6/poly7/' published >unknown && sed 's/"published"/"unknown"/' published.json >unknown.json
+refuses 1 "unknown: architecture 'conv': 'window' is not understood" train unknown.json
+
 # ---- The examples are configs that the program understands ----
 
 for example in "$source"/examples/train/*.json; do

@@ -7,19 +7,58 @@
 #include <string.h>
 
 #include "../demo_model.h"
+#include "published.h"
+#include "tensor_file.h"
 
-ascc_status ascc_host_model(ascc_context *context, const char *name, int32_t dimension,
-                            double spacing, ascc_model **model)
+/* The context's message is the error's. */
+static ascc_status told(ascc_context *context, ascc_status status, ascc_host_error *error)
 {
-    if (strcmp(name, "demo") != 0)
-        return ascc_model_load(context, name, model);
-    size_t size;
-    unsigned char *bytes = demo_model_bytes(dimension, spacing, &size);
+    if (status != ASCC_OK)
+        (void)ascc_context_message(context, error->text, sizeof error->text);
+    return status;
+}
+
+/* From bytes of malloc, which are freed. */
+static ascc_status load_bytes(ascc_context *context, unsigned char *bytes, size_t size,
+                              ascc_model **model, ascc_host_error *error)
+{
     if (!bytes)
-        return ASCC_ERROR_MEMORY;
+        return ASCC_ERROR_FORMAT;
     const ascc_status status = ascc_model_load_memory(context, bytes, size, model);
     free(bytes);
-    return status;
+    return told(context, status, error);
+}
+
+ascc_status ascc_host_load(ascc_context *context, const char *path, ascc_model **model,
+                           ascc_host_error *error)
+{
+    size_t size;
+    ascc_host_error why;
+    const ascc_status status = told(context, ascc_model_load(context, path, model), error);
+    if (status != ASCC_ERROR_FORMAT)
+        return status;
+    unsigned char *bytes = ascc_tensor_file_read(path, &size, why.text, sizeof why.text);
+    if (!bytes || !ascc_published_is(bytes, size)) {
+        free(bytes);
+        return status;
+    }
+    unsigned char *converted =
+        ascc_published_convert(bytes, size, &size, error->text, sizeof error->text);
+    free(bytes);
+    return load_bytes(context, converted, size, model, error);
+}
+
+ascc_status ascc_host_model(ascc_context *context, const char *name, int32_t dimension,
+                            double spacing, ascc_model **model, ascc_host_error *error)
+{
+    if (strcmp(name, "demo") != 0)
+        return ascc_host_load(context, name, model, error);
+    size_t size;
+    unsigned char *bytes = demo_model_bytes(dimension, spacing, &size);
+    if (bytes)
+        return load_bytes(context, bytes, size, model, error);
+    (void)snprintf(error->text, sizeof error->text, "no memory");
+    return ASCC_ERROR_MEMORY;
 }
 
 ascc_status ascc_host_particles(ascc_context *context, const ascc_sequence *scene,
@@ -47,11 +86,8 @@ ascc_status ascc_host_particles(ascc_context *context, const ascc_sequence *scen
     return status;
 }
 
-void ascc_host_complain(ascc_context *context, const char *what, ascc_status status)
+void ascc_host_complain(const char *what, ascc_status status, const char *message)
 {
-    char text[256] = "";
-    if (context)
-        (void)ascc_context_message(context, text, sizeof text);
-    ascc_line(stderr, "ascc: %s: %s%s%s", what, ascc_status_text(status), text[0] ? ": " : "",
-              text);
+    ascc_line(stderr, "ascc: %s: %s%s%s", what, ascc_status_text(status), message[0] ? ": " : "",
+              message);
 }

@@ -7,9 +7,18 @@
 
 #include "sequence.h"
 
-/* A model file, or `demo`: the demonstration model for that dimension and spacing. */
+/* Why a model was not loaded. */
+typedef struct ascc_host_error {
+    char text[256];
+} ascc_host_error;
+
+/* A model file or a published network (published.h). */
+ascc_status ascc_host_load(ascc_context *context, const char *path, ascc_model **model,
+                           ascc_host_error *error);
+
+/* The same, or `demo`: the demonstration model for that dimension and spacing. */
 ascc_status ascc_host_model(ascc_context *context, const char *name, int32_t dimension,
-                            double spacing, ascc_model **model);
+                            double spacing, ascc_model **model, ascc_host_error *error);
 
 /* A particle set with the fluid of one frame, its velocities, and all walls as body 0.
  * position, velocity: [count][dimension]. */
@@ -17,7 +26,7 @@ ascc_status ascc_host_particles(ascc_context *context, const ascc_sequence *scen
                                 const float *position, const float *velocity,
                                 ascc_particles **particles);
 
-/* Prints "ascc: WHAT: status: the context's message" on stderr. */
-void ascc_host_complain(ascc_context *context, const char *what, ascc_status status);
+/* Prints "ascc: WHAT: status: message" on stderr; the message may be empty. */
+void ascc_host_complain(const char *what, ascc_status status, const char *message);
 
 #endif

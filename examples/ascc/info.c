@@ -54,7 +54,8 @@ int ascc_command_info(int argc, char **argv)
 {
     if (argc != 1 || strcmp(argv[0], "--help") == 0) {
         fprintf(argc == 1 ? stdout : stderr, "usage: ascc info FILE\n\n"
-                                             "FILE is a model or a sequence file.\n");
+                                             "FILE is a model file, a published network "
+                                             "or a sequence file.\n");
         return argc == 1 ? 0 : 2;
     }
     ascc_sequence sequence;
@@ -66,16 +67,17 @@ int ascc_command_info(int argc, char **argv)
     }
     ascc_context *context = NULL;
     ascc_model *model = NULL;
+    ascc_host_error why = {""};
     ascc_status status = ascc_context_create(NULL, &context);
     if (status == ASCC_OK)
-        status = ascc_model_load(context, argv[0], &model);
+        status = ascc_host_load(context, argv[0], &model, &why);
     if (status == ASCC_OK) {
         ascc_model_info info = {.size = sizeof info};
         status = ascc_model_get_info(model, &info);
         if (status == ASCC_OK)
             print_model(argv[0], &info);
     } else {
-        ascc_host_complain(context, "neither a model nor a sequence", status);
+        ascc_host_complain("neither a model nor a sequence", status, why.text);
         ascc_line(stderr, "ascc: read as a sequence: %s", error);
     }
     ascc_model_destroy(&model);

@@ -18,6 +18,7 @@ static const struct {
     {"lint", "check sequences for spikes, escapes and clumps", ascc_command_lint},
     {"eval", "measure a method on true sequences", ascc_command_eval},
     {"train", "train a network over rollouts", ascc_command_train},
+    {"convert", "make a model file of a published network", ascc_command_convert},
 };
 
 static void usage(FILE *out)

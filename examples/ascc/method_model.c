@@ -43,10 +43,14 @@ static bool learned_load(learned *m, const char *path, ascc_method_error *error)
     const ascc_context_options options = {.size = sizeof options,
                                           .thread_count = m->scene->threads};
     ascc_model_info info = {.size = sizeof info};
-    if (ascc_context_create(&options, &m->context) != ASCC_OK ||
-        ascc_host_model(m->context, path, m->scene->dimension, m->scene->spacing, &m->model) !=
-            ASCC_OK)
+    ascc_host_error why;
+    if (ascc_context_create(&options, &m->context) != ASCC_OK)
         return context_failed(m, "model", error);
+    if (ascc_host_model(m->context, path, m->scene->dimension, m->scene->spacing, &m->model,
+                        &why) != ASCC_OK) {
+        snprintf(error->text, sizeof error->text, "model: %.220s", why.text);
+        return false;
+    }
     (void)ascc_model_get_info(m->model, &info);
     if (info.dimension != m->scene->dimension) {
         snprintf(error->text, sizeof error->text, "a model for %dD, a scene in %dD",
@@ -191,7 +195,8 @@ static void learned_body_impulse(const void *state, double impulse[3])
 
 const ascc_method ascc_method_model = {
     .prefix = "",
-    .help = "FILE           a model file, run by libascc; demo: the demonstration model",
+    .help = "FILE           a model file or published network, run by libascc; demo: the "
+            "demonstration model",
     .open = learned_open,
     .set = learned_set,
     .advance = learned_advance,

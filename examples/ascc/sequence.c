@@ -10,11 +10,9 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/stat.h>
 
-#include <jansson.h>
+#include "tensor_file.h"
 
-#define MAX_HEADER ((size_t)16 << 20)
 #define HEADER_ROOM 8192 /* reserved for the header of a file that is being written */
 
 /* Where messages go. */
@@ -45,42 +43,13 @@ typedef struct file {
     report report;
 } file;
 
-static bool read_bytes(file *f)
-{
-    FILE *in = fopen(f->report.path, "rb");
-    if (!in)
-        return fail(&f->report, "%s", strerror(errno));
-    struct stat about;
-    if (fstat(fileno(in), &about) != 0 || !S_ISREG(about.st_mode)) {
-        (void)fclose(in);
-        return fail(&f->report, "is no regular file");
-    }
-    f->size = (size_t)about.st_size;
-    f->bytes = malloc(f->size + 1);
-    const bool good = f->bytes && fread(f->bytes, 1, f->size, in) == f->size;
-    (void)fclose(in);
-    return good || fail(&f->report, "cannot be read");
-}
-
 static bool open_file(file *f)
 {
-    if (!read_bytes(f))
-        return false;
-    if (f->size < 8)
-        return fail(&f->report, "is too short for a safetensors file");
-    uint64_t length = 0;
-    for (int i = 0; i < 8; i++)
-        length |= (uint64_t)f->bytes[i] << 8 * i;
-    if (length > MAX_HEADER || length > f->size - 8)
-        return fail(&f->report, "the header of %llu bytes is longer than the file",
-                    (unsigned long long)length);
-    f->data = 8 + (size_t)length;
-    json_error_t error;
-    f->header =
-        json_loadb((const char *)f->bytes + 8, (size_t)length, JSON_REJECT_DUPLICATES, &error);
-    if (!json_is_object(f->header))
-        return fail(&f->report, "the header is not JSON: %s", error.text);
-    return true;
+    char why[300];
+    f->bytes = ascc_tensor_file_read(f->report.path, &f->size, why, sizeof why);
+    if (f->bytes)
+        f->header = ascc_tensor_file_header(f->bytes, f->size, &f->data, why, sizeof why);
+    return f->header || fail(&f->report, "%s", why);
 }
 
 static void close_file(file *f)
@@ -93,7 +62,7 @@ static void close_file(file *f)
 
 static const char *text_of(const file *f, const char *key)
 {
-    return json_string_value(json_object_get(json_object_get(f->header, "__metadata__"), key));
+    return ascc_tensor_file_metadata(f->header, key);
 }
 
 static bool numbers(const file *f, const char *key, size_t count, double *values)

@@ -31,7 +31,7 @@ static void usage(FILE *to)
     fprintf(
         to,
         "usage: ascc sim MODEL SCENE -n STEPS [-o OUT] [options]\n\n"
-        "MODEL  a model file, or demo (a demonstration model, not trained)\n"
+        "MODEL  a model file, a published network, or demo (a demonstration model, not trained)\n"
         "SCENE  a sequence file, whose first frame starts the run, or one of (3D without -2d)\n");
     for (const ascc_scene_name *s = ascc_scene_names; s->name; s++)
         fprintf(to, "         %s-2d, %s-3d: %s\n", s->name, s->name, s->text);
@@ -390,9 +390,10 @@ static bool open_model(simulation *s)
     const bool demo = strcmp(o->model, "demo") == 0;
     const ascc_context_options context = {.size = sizeof context, .thread_count = o->threads};
     ascc_model_info info = {.size = sizeof info, .particle_spacing = 0.05};
+    ascc_host_error why = {""};
     ascc_status status = ascc_context_create(&context, &s->context);
     if (status == ASCC_OK && !demo)
-        status = ascc_host_model(s->context, o->model, 0, 0.0, &s->model);
+        status = ascc_host_load(s->context, o->model, &s->model, &why);
     if (status == ASCC_OK && !demo)
         status = ascc_model_get_info(s->model, &info);
     const double spacing = o->spacing > 0.0 ? o->spacing : info.particle_spacing;
@@ -400,11 +401,11 @@ static bool open_model(simulation *s)
         return false;
     if (status == ASCC_OK && demo)
         status = ascc_host_model(s->context, o->model, s->scene.dimension, 2.0 * s->scene.radius,
-                                 &s->model);
+                                 &s->model, &why);
     if (status == ASCC_OK && demo)
         status = ascc_model_get_info(s->model, &info);
     if (status != ASCC_OK) {
-        ascc_host_complain(s->context, o->model, status);
+        ascc_host_complain(o->model, status, why.text);
         return false;
     }
     if (info.dimension != s->scene.dimension)
@@ -428,9 +429,12 @@ static bool open_step(simulation *s)
         return false;
     const ascc_step_options settings = {.size = sizeof settings, .time_step = s->o->time_step};
     const ascc_status status = ascc_step_create(s->context, s->model, &settings, &s->step);
-    if (status != ASCC_OK)
-        ascc_host_complain(s->context, "step", status);
-    return status == ASCC_OK;
+    if (status == ASCC_OK)
+        return true;
+    char message[256];
+    (void)ascc_context_message(s->context, message, sizeof message);
+    ascc_host_complain("step", status, message);
+    return false;
 }
 
 static bool open_outputs(simulation *s)

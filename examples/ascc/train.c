@@ -23,6 +23,7 @@
 #include "evaluate.h"
 #include "new_file.h"
 #include "progress.h"
+#include "published.h"
 #include "sequence.h"
 #include "train_config.h"
 #include "file/safetensors.h"
@@ -379,13 +380,27 @@ static bool copy_weights(training *t, const unsigned char *from, size_t from_siz
     return good;
 }
 
+/* The bytes of a model file; a published network is converted. NULL after fail. */
+static unsigned char *read_model(training *t, const char *path, size_t *size)
+{
+    char why[256] = "";
+    unsigned char *bytes = read_whole(t, path, size);
+    if (!bytes || !ascc_published_is(bytes, *size))
+        return bytes;
+    unsigned char *converted = ascc_published_convert(bytes, *size, size, why, sizeof why);
+    if (!converted)
+        (void)fail(t, path, why);
+    free(bytes);
+    return converted;
+}
+
 /* The model file that training begins with; NULL after fail. */
 static unsigned char *first_model(training *t, size_t *size)
 {
     const ascc_train_config *c = &t->config;
     char why[256] = "";
     size_t given_size;
-    unsigned char *given = c->model[0] ? read_whole(t, c->model, &given_size) : NULL;
+    unsigned char *given = c->model[0] ? read_model(t, c->model, &given_size) : NULL;
     if (c->model[0] && (!given || !c->described)) {
         *size = given_size;
         return given;

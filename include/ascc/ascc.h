@@ -130,8 +130,8 @@ ASCC_API size_t ascc_context_message(const ascc_context *context, char *text, si
 typedef struct ascc_model ascc_model;
 
 /**
- * Loads a model from a safetensors file (docs/file-format.md). The two published pretrained networks
- * converted to safetensors (metadata format "ascc.weights") are read as they are.
+ * Loads a model from a safetensors file (docs/file-format.md). Published networks (metadata format
+ * "ascc.weights") are refused: `ascc convert` makes model files of them.
  *
  * context   may be destroyed before the model.
  * model     receives the handle; the caller's, until ascc_model_destroy.

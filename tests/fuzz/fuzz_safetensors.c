@@ -1,4 +1,5 @@
-/* libFuzzer entry: loads a model from bytes and, if it loads, checks what every plan promises.
+/* libFuzzer entry: loads a model from bytes, as they are and as a published network, and checks what
+ * every plan promises.
  * SPDX-License-Identifier: MIT
  *
  * The first byte says what the rest is, so that the fuzzer reaches beyond the header's length field
@@ -15,6 +16,7 @@
 #include <string.h>
 
 #include "model/model.h"
+#include "published.h"
 #include "support/model_builder.h"
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
@@ -64,7 +66,7 @@ static void check_plan(const ascc_plan *plan)
                      (output->half_axis < 0 ? 1 : 2));
 }
 
-static void load(const void *bytes, size_t size)
+static void load_model(const void *bytes, size_t size)
 {
     ascc_context *context = NULL;
     ascc_model *model = NULL;
@@ -82,6 +84,18 @@ static void load(const void *bytes, size_t size)
     }
     ascc_model_destroy(&model);
     ascc_context_destroy(&context);
+}
+
+static void load(const void *bytes, size_t size)
+{
+    size_t made = 0;
+    char why[256] = "";
+    unsigned char *converted = ascc_published_convert(bytes, size, &made, why, sizeof why);
+    require(converted || why[0]);
+    load_model(bytes, size);
+    if (converted)
+        load_model(converted, made);
+    free(converted);
 }
 
 /* A file around a header that may hold any bytes. */

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Tests of the converters: python3 -m unittest bench/convert/test_convert.py, or as a program for
+"""Tests of the converters: python3 -m unittest examples/convert/test_convert.py, or as a program for
 TAP output. Published samples are looked for in $ASCC_SHARED, or ../shared beside the repository;
 the original checkpoints in $ASCC_CHECKPOINTS. Tests that need what is not there say so and skip."""
 

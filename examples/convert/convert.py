@@ -3,7 +3,7 @@
 """Published data sets and networks as libascc's own files; see README.md beside this file.
 
     convert.py data FORMAT INPUT... -o DIR       one sequence file per scene
-    convert.py weights FORMAT INPUT -o FILE      one model file
+    convert.py weights FORMAT INPUT -o FILE      one network, for `ascc convert`
 
 Exit codes: 0 done, 2 wrong input or arguments; what was written before an error is whole.
 """
@@ -93,7 +93,7 @@ def arguments(argv):
     data.add_argument("--source", help="text for the files' metadata")
 
     weights = commands.add_parser(
-        "weights", help="model files", formatter_class=argparse.RawTextHelpFormatter
+        "weights", help="networks", formatter_class=argparse.RawTextHelpFormatter
     )
     weights.add_argument(
         "format",

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""Published networks as model files (metadata format `ascc.weights`).
+"""Published networks as safetensors files (metadata format `ascc.weights`), which `ascc convert`
+makes model files of.
 
 dmcf-liquid3d.json and cconv-liquid3d.json say what the networks are: every tensor with its shape,
-and the metadata a model file carries. A checkpoint must hold exactly these tensors. Kernels keep
+and the metadata the file carries. A checkpoint must hold exactly these tensors. Kernels keep
 their axis order [z,y,x,in,out]; dense kernels are [in,out], so PyTorch's are transposed.
 
 If the tensors are the published ones bit for bit, the file says so in `source`; else it says what
@@ -94,7 +95,7 @@ def read_cconv_torch(path, names):
 
 
 def check_buffers(path, state):
-    """What the network holds besides weights, and a model file states in its metadata."""
+    """What the network holds besides weights, and the file states in its metadata."""
     gravity = state.get("gravity", np.float32(GRAVITY))
     if not np.array_equal(gravity.astype(np.float32), np.float32(GRAVITY)):
         raise ConvertError(path, "gravity", f"{gravity.tolist()}, expected {list(GRAVITY)}")

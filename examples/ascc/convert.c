@@ -1,0 +1,90 @@
+/* ascc convert: a published network becomes a model file. SPDX-License-Identifier: MIT */
+#include <stdbool.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+
+#include "commands.h"
+#include "console.h"
+#include "host.h"
+#include "published.h"
+#include "tensor_file.h"
+
+static int usage(FILE *out)
+{
+    fprintf(out, "usage: ascc convert IN -o OUT\n\n"
+                 "IN is a published network as examples/convert/convert.py writes it (format\n"
+                 "ascc.weights); OUT becomes a model file with the same weights, for hosts of the\n"
+                 "library. The other commands take published networks as they are.\n"
+                 "A file that is there is replaced, and only by a model that loads.\n");
+    return out == stdout ? 0 : 2;
+}
+
+static int failed(const char *path, const char *why)
+{
+    ascc_line(stderr, "ascc convert: %s: %s", path, why);
+    return 1;
+}
+
+static bool same_file(const char *a, const char *b)
+{
+    struct stat x, y;
+    return stat(a, &x) == 0 && stat(b, &y) == 0 && x.st_dev == y.st_dev && x.st_ino == y.st_ino;
+}
+
+/* Bytes of the model file, from malloc; NULL after failed. */
+static unsigned char *convert(const char *in, size_t *size)
+{
+    char why[256];
+    unsigned char *converted = NULL, *bytes = ascc_tensor_file_read(in, size, why, sizeof why);
+    if (bytes)
+        converted = ascc_published_convert(bytes, *size, size, why, sizeof why);
+    free(bytes);
+    if (!converted)
+        (void)failed(in, why);
+    return converted;
+}
+
+/* Loads the model, which checks all of it, and writes it. */
+static int write_model(const char *in, const char *out, const unsigned char *bytes, size_t size)
+{
+    char why[256];
+    ascc_context *context = NULL;
+    ascc_model *model = NULL;
+    ascc_model_info info = {.size = sizeof info};
+    if (ascc_context_create(NULL, &context) != ASCC_OK)
+        return failed(out, "no memory");
+    const bool loaded = ascc_model_load_memory(context, bytes, size, &model) == ASCC_OK;
+    const bool good = loaded && ascc_model_save(model, out) == ASCC_OK;
+    if (good && ascc_model_get_info(model, &info) == ASCC_OK)
+        ascc_line(stdout, "%s: model %s, %llu parameters", out, info.name,
+                  (unsigned long long)info.parameter_count);
+    (void)ascc_context_message(context, why, sizeof why);
+    ascc_model_destroy(&model);
+    ascc_context_destroy(&context);
+    return good ? 0 : failed(loaded ? out : in, why);
+}
+
+int ascc_command_convert(int argc, char **argv)
+{
+    const char *in = NULL, *out = NULL;
+    if (argc == 1 && strcmp(argv[0], "--help") == 0)
+        return usage(stdout);
+    for (int i = 0; i < argc; i++)
+        if (strcmp(argv[i], "-o") == 0 && i + 1 < argc && !out)
+            out = argv[++i];
+        else if (argv[i][0] != '-' && !in)
+            in = argv[i];
+        else
+            return usage(stderr);
+    if (!in || !out)
+        return usage(stderr);
+    if (same_file(in, out))
+        return failed(out, "is the network that is to be converted");
+    size_t size;
+    unsigned char *bytes = convert(in, &size);
+    const int status = bytes ? write_model(in, out, bytes, size) : 1;
+    free(bytes);
+    return status;
+}
