@@ -4,101 +4,8 @@
 #include <math.h>
 #include <string.h>
 
-/* A radius takes at most 2^27 units, so that the difference of two points three cells apart fits the
- * low word of a position and is exact. */
-#define RADIUS_BITS 27
-#define POSITION_LIMIT 4.6e18 /* units; below 2^62 */
-
-ascc_scale ascc_scale_for_radius(double largest_radius)
-{
-    int exponent;
-    (void)frexp(largest_radius, &exponent); /* largest_radius <= 2^exponent */
-    const ascc_scale scale = {ldexp(1.0, exponent - RADIUS_BITS),
-                              ldexp(1.0, RADIUS_BITS - exponent)};
-    return scale;
-}
-
-bool ascc_scale_apply(const ascc_scale *scale, double length, int64_t *units)
-{
-    const double u = rint(length * scale->inverse);
-    if (!(fabs(u) < POSITION_LIMIT))
-        return false;
-    *units = (int64_t)u;
-    return true;
-}
-
-bool ascc_points_take(ascc_points *points, ascc_arena *arena, size_t count)
-{
-    points->count = count;
-    for (int c = 0; c < 3; c++) {
-        points->position[c] = ascc_arena_take(arena, count, sizeof(int64_t));
-        points->low[c] = ascc_arena_take(arena, count, sizeof(int32_t));
-        if (!points->position[c] || !points->low[c])
-            return false;
-    }
-    return true;
-}
-
-void ascc_extent_start(ascc_extent *extent)
-{
-    for (int c = 0; c < 3; c++) {
-        extent->low[c] = INT64_MAX;
-        extent->high[c] = INT64_MIN;
-    }
-}
-
-static void extent_add_part(ascc_extent *extent, const ascc_points *points, size_t begin,
-                            size_t end)
-{
-    for (int c = 0; c < 3; c++) {
-        const int64_t *p = points->position[c];
-        int64_t low = extent->low[c], high = extent->high[c];
-        for (size_t i = begin; i < end; i++) {
-            low = p[i] < low ? p[i] : low;
-            high = p[i] > high ? p[i] : high;
-        }
-        extent->low[c] = low;
-        extent->high[c] = high;
-    }
-}
-
-void ascc_extent_add(ascc_extent *extent, const ascc_points *points)
-{
-    extent_add_part(extent, points, 0, points->count);
-}
-
-typedef struct extent_job {
-    const ascc_points *points;
-    size_t part;
-    ascc_extent extent[ASCC_SORT_PARTS];
-} extent_job;
-
-static void measure_part(void *data, size_t begin, size_t end, int32_t slot)
-{
-    (void)slot;
-    extent_job *job = data;
-    extent_add_part(&job->extent[begin / job->part], job->points, begin, end);
-}
-
-ascc_extent ascc_extent_of(const ascc_points *points, ascc_workers *workers)
-{
-    extent_job job = {.points = points, .part = ascc_part_size(points->count)};
-    for (size_t p = 0; p < ASCC_SORT_PARTS; p++)
-        ascc_extent_start(&job.extent[p]);
-    ascc_workers_run(workers, points->count, job.part, measure_part, &job);
-    ascc_extent all = job.extent[0];
-    for (size_t p = 1; p < ASCC_SORT_PARTS; p++)
-        for (int c = 0; c < 3; c++) {
-            all.low[c] = job.extent[p].low[c] < all.low[c] ? job.extent[p].low[c] : all.low[c];
-            all.high[c] = job.extent[p].high[c] > all.high[c] ? job.extent[p].high[c] : all.high[c];
-        }
-    return all;
-}
-
-/* ---- Cells ---- */
-
-/* World-anchored cell of a coordinate. Monotone, so neighbours within cell * (1 - 2^-12) are at most
- * one cell apart in spite of rounding. */
+/* World-anchored cell of a coordinate. Monotone, and rounded by less than 2^-12 cells up to cell 2^40, so
+ * that points within cell * (1 - 2^-11) are at most one cell apart. */
 static inline int64_t cell_of(int64_t position, double inverse_cell)
 {
     const double x = (double)position * inverse_cell; /* below 2^62: whole numbers fit */
@@ -111,46 +18,20 @@ double ascc_grid_cell(double radius)
     return radius * (1.0 + 1.0 / 2048.0) + 1.0;
 }
 
-static int bits_for(uint64_t largest)
+static void cells_of(const void *data, int c, int64_t low, int64_t high, int64_t *first,
+                     int64_t *last)
 {
-    int bits = 1;
-    while (bits < 64 && largest >> bits)
-        bits++;
-    return bits;
-}
-
-/* Where keys start and how they are packed; cells have a margin of one on every side. False if they do
- * not fit 64 bits. */
-static bool key_layout(ascc_grid *grid, const ascc_extent *extent, int *bits)
-{
-    const double inverse = 1.0 / grid->cell;
-    int width[3];
-    for (int c = 0; c < 3; c++) {
-        if (extent->low[c] > extent->high[c]) { /* no points at all */
-            grid->base[c] = 0;
-            width[c] = 2;
-            continue;
-        }
-        grid->base[c] = cell_of(extent->low[c], inverse) - 1;
-        width[c] = bits_for((uint64_t)(cell_of(extent->high[c], inverse) + 1 - grid->base[c]));
-    }
-    grid->flat = extent->low[2] >= extent->high[2];
-    grid->shift_y = width[0];
-    grid->shift_z = width[0] + width[1];
-    *bits = width[0] + width[1] + width[2];
-    return *bits <= 64 && grid->shift_z < 64;
-}
-
-static inline uint64_t key_of(const ascc_grid *grid, const int64_t cell[3])
-{
-    return (uint64_t)(cell[0] - grid->base[0]) |
-           (uint64_t)(cell[1] - grid->base[1]) << grid->shift_y |
-           (uint64_t)(cell[2] - grid->base[2]) << grid->shift_z;
+    (void)c;
+    const double *inverse = data;
+    *first = cell_of(low, *inverse);
+    *last = cell_of(high, *inverse);
 }
 
 typedef struct key_job {
     const ascc_points *points;
-    const ascc_grid *grid;
+    ascc_axis axis[3];
+    int shift[4];
+    double inverse; /* of the cell size */
     ascc_keys keys;
 } key_job;
 
@@ -158,35 +39,40 @@ static void make_keys(void *data, size_t begin, size_t end, int32_t slot)
 {
     (void)slot;
     const key_job *job = data;
-    const double inverse = 1.0 / job->grid->cell;
     for (size_t i = begin; i < end; i++) {
-        const int64_t cell[3] = {cell_of(job->points->position[0][i], inverse),
-                                 cell_of(job->points->position[1][i], inverse),
-                                 cell_of(job->points->position[2][i], inverse)};
-        job->keys.key[i] = key_of(job->grid, cell);
+        uint64_t key = 0;
+        for (int c = 0; c < 3; c++)
+            key |=
+                ascc_axis_number(&job->axis[c], cell_of(job->points->position[c][i], job->inverse))
+                << job->shift[c];
+        job->keys.key[i] = key;
         if (job->keys.row)
             job->keys.row[i] = (uint32_t)i;
     }
 }
 
-/* Keys of all points, lent; with sort: and their rows, sorted by key, rows ascending within a key. */
+/* Keys of all points, lent; with sort: and their rows, sorted by key, rows ascending within a key. Cells
+ * have a margin of one on every side, for the cells around. */
 static ascc_status lend_keys(ascc_grid *grid, const ascc_search_tools *tools,
-                             const ascc_points *points, const ascc_extent *extent, bool sort,
+                             const ascc_points *points, ascc_extent *extent, bool sort,
                              ascc_keys *keys)
 {
-    int bits;
     if (points->count >= UINT32_MAX)
         return ascc_fail(tools->message, ASCC_ERROR_RANGE, "%zu points are too many for one set",
                          points->count);
-    if (!key_layout(grid, extent, &bits))
-        return ascc_fail(tools->message, ASCC_ERROR_RANGE,
-                         "the points span too many cells of %g units to number them", grid->cell);
-    key_job job = {.points = points, .grid = grid};
+    key_job job = {.points = points, .inverse = 1.0 / grid->cell};
+    const ascc_status status =
+        ascc_extent_number(job.axis, job.shift, tools, extent, cells_of, &job.inverse, 1);
+    if (status != ASCC_OK)
+        return status;
+    grid->shift_y = job.shift[1];
+    grid->shift_z = job.shift[2];
+    grid->flat = extent->box[2].low >= extent->box[2].high;
     bool room = ascc_keys_lend(&job.keys, tools->arena, points->count, sort);
     if (room) {
         ascc_workers_run(tools->workers, points->count, 4096, make_keys, &job);
         *keys = job.keys;
-        room = !sort || ascc_keys_sort(keys, tools->arena, tools->workers, bits);
+        room = !sort || ascc_keys_sort(keys, tools->arena, tools->workers, job.shift[3]);
     }
     return room ? ASCC_OK
                 : ascc_fail(tools->message, ASCC_ERROR_MEMORY, "no memory to sort %zu points",
@@ -272,7 +158,7 @@ static void sort_cells(void *data, size_t begin, size_t end, int32_t slot)
 }
 
 ascc_status ascc_points_order(const ascc_search_tools *tools, const ascc_points *points,
-                              const ascc_extent *extent, double cell, uint32_t *order)
+                              ascc_extent *extent, double cell, uint32_t *order)
 {
     const ascc_arena_mark mark = ascc_arena_mark_of(tools->arena);
     ascc_grid grid = {.cell = cell};
@@ -305,7 +191,7 @@ static void fill_slots(void *data, size_t begin, size_t end, int32_t slot)
 }
 
 ascc_status ascc_grid_build(ascc_grid *grid, const ascc_search_tools *tools,
-                            const ascc_points *points, const ascc_extent *extent, double radius,
+                            const ascc_points *points, ascc_extent *extent, double radius,
                             bool sorted)
 {
     const ascc_arena_mark mark = ascc_arena_mark_of(tools->arena);
