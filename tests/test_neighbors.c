@@ -195,6 +195,28 @@ static void gaps_of_any_width_keep_neighbours_and_make_none(void **state)
     }
 }
 
+/* Kernels see low words only: a cloud and its copy 2^32 units away look the same to them. */
+static void copies_a_whole_low_word_away_are_no_neighbours(void **state)
+{
+    (void)state;
+    dice d = {37};
+    const size_t n = 40, copies = 12;
+    for (int dimension = 2; dimension <= 3; dimension++)
+        for (int axis = 0; axis < dimension; axis++) {
+            const size_t axes = (size_t)dimension;
+            double *x = calloc(n * copies * axes, sizeof *x);
+            for (size_t i = 0; i < n * axes; i++)
+                x[i] = dice_uniform(&d, -0.5, 0.5);
+            for (size_t k = 1; k < copies; k++) /* a word is 8 m at this radius */
+                for (size_t i = 0; i < n * axes; i++)
+                    x[k * n * axes + i] =
+                        x[i] + (i % axes == (size_t)axis || k % 2 ? ldexp(8.0, (int)k * 5 / 2) : 0);
+            check_search(x, n * copies, NULL, 0, dimension, 0.125, 2);
+            check_search(x, n, x + n * axes, n * (copies - 1), dimension, 0.125, 1);
+            free(x);
+        }
+}
+
 static void strays_leave_the_order_of_the_others(void **state)
 {
     (void)state;
@@ -220,6 +242,24 @@ static void strays_leave_the_order_of_the_others(void **state)
         if (b[i] < n)
             assert_int_equal(b[i], a[kept++]);
     assert_int_equal(kept, n);
+    free(x);
+    tools_close(&t);
+}
+
+static void a_quarter_million_scattered_points_find_themselves(void **state)
+{
+    (void)state;
+    test_tools t;
+    tools_open(&t, 2, 0);
+    const size_t n = (size_t)1 << 18;
+    double *x = calloc(n * 3, sizeof *x);
+    for (size_t i = 0; i < n * 3; i++)
+        x[i] = (double)(i / 3) * 100.0;
+    search_case s;
+    assert_int_equal(build(&s, &t, x, n, NULL, 0, 3, 0.1), ASCC_OK);
+    assert_int_equal(ascc_rows_make(&s.rows, &t.search, NULL), ASCC_OK);
+    for (size_t i = 0; i < n; i++)
+        assert_true(s.rows.count[i] == 1 && s.rows.neighbor[s.rows.start[i]] == i);
     free(x);
     tools_close(&t);
 }
@@ -441,7 +481,9 @@ int main(void)
         cmocka_unit_test(sparse_points_far_apart_find_only_near_ones),
         cmocka_unit_test(strays_on_every_axis_leave_the_neighbours_of_the_others),
         cmocka_unit_test(gaps_of_any_width_keep_neighbours_and_make_none),
+        cmocka_unit_test(copies_a_whole_low_word_away_are_no_neighbours),
         cmocka_unit_test(strays_leave_the_order_of_the_others),
+        cmocka_unit_test(a_quarter_million_scattered_points_find_themselves),
         cmocka_unit_test(more_scattered_points_than_keys_can_number_are_an_error),
         cmocka_unit_test(sets_of_2_to_the_32_points_are_an_error),
         cmocka_unit_test(coincident_points_are_all_neighbours),

@@ -187,9 +187,8 @@ static void number_axis(ascc_axis *axis, ascc_axis_run *run, int c, const ascc_s
         cells(data, c, stretch[k].low, stretch[k].high, &first, &last);
         if (k == 0 || first > end + FARTHEST_IN_RUN) {
             run[runs++] = (ascc_axis_run){first, k == 0 ? margin : axis->last + FARTHEST_IN_RUN};
-            end = first;
         }
-        end = last > end ? last : end;
+        end = last;
         axis->last = run[runs - 1].number + (uint64_t)(end - run[runs - 1].first);
     }
     if (runs) {
