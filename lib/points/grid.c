@@ -89,21 +89,9 @@ static bool precedes(const ascc_points *p, uint32_t a, uint32_t b)
     return a < b;
 }
 
-static void sift(const ascc_points *p, uint32_t *order, size_t root, size_t count)
+static bool row_precedes(const void *points, const void *a, const void *b)
 {
-    for (;;) {
-        size_t child = 2 * root + 1;
-        if (child >= count)
-            return;
-        if (child + 1 < count && precedes(p, order[child], order[child + 1]))
-            child++;
-        if (!precedes(p, order[root], order[child]))
-            return;
-        const uint32_t swap = order[root];
-        order[root] = order[child];
-        order[child] = swap;
-        root = child;
-    }
+    return precedes(points, *(const uint32_t *)a, *(const uint32_t *)b);
 }
 
 /* Sorts by position, then by row: insertion for the usual handful, a heap for a crowd. */
@@ -119,14 +107,7 @@ static void sort_cell(const ascc_points *p, uint32_t *order, size_t count)
         }
         return;
     }
-    for (size_t i = count / 2; i-- > 0;)
-        sift(p, order, i, count);
-    for (size_t i = count - 1; i > 0; i--) {
-        const uint32_t swap = order[0];
-        order[0] = order[i];
-        order[i] = swap;
-        sift(p, order, 0, i);
-    }
+    ascc_heap_sort(order, count, sizeof *order, row_precedes, p);
 }
 
 typedef struct order_job {
