@@ -4,7 +4,8 @@
 #include <math.h>
 #include <string.h>
 
-/* How many candidates are looked at between two checks for a crowd. */
+/* Candidates given to the search kernel at once: after each such piece a list is compared with
+ * max_neighbors, so scratch has to hold no more than one piece beyond that. */
 #define SEARCH_CHUNK 1024
 
 ascc_status ascc_rows_open(ascc_rows *rows, const ascc_search_tools *tools, size_t expected)
@@ -15,7 +16,7 @@ ascc_status ascc_rows_open(ascc_rows *rows, const ascc_search_tools *tools, size
     rows->count = ascc_arena_take(tools->arena, count, sizeof *rows->count);
     rows->start = ascc_arena_take(tools->arena, count, sizeof *rows->start);
     if (!rows->count || !rows->start)
-        return ascc_fail(tools->message, ASCC_ERROR_MEMORY, "no memory for %zu neighbour rows",
+        return ascc_fail(tools->message, ASCC_ERROR_MEMORY, "no memory for %zu neighbour lists",
                          count);
     memset(rows->count, 0xff, count * sizeof *rows->count); /* ASCC_ROW_ABSENT */
     rows->neighbor = NULL;
@@ -50,7 +51,7 @@ typedef struct rows_job {
     distance *heap;    /* [slots][limit] */
     size_t scratch_size;
     atomic_size_t used;
-    atomic_uint crowded; /* 1 + a query row with too many neighbours */
+    atomic_uint crowded; /* 1 + a query with too many neighbours */
     atomic_uint longest;
     atomic_size_t stored;
 } rows_job;
@@ -176,13 +177,13 @@ static bool search_run(const rows_job *job, size_t begin, size_t end, const int3
 /* Neighbours a worker sets aside at once, so that threads seldom meet at the counter. */
 #define SET_ASIDE 512
 
-/* What a worker has set aside and not used; its longest row, and all it stored. */
+/* What a worker has set aside and not used; its longest list, and all it stored. */
 typedef struct room {
     size_t next, end;
     size_t longest, stored;
 } room;
 
-/* Puts a finished row at its place, if there is one; else it is made again. */
+/* Copies a finished list to its place, if there is one; else it is made again. */
 static void store_row(rows_job *job, room *r, size_t query, const uint32_t *found, size_t count)
 {
     ascc_rows *rows = job->rows;
@@ -233,11 +234,11 @@ static size_t cell_at(const ascc_grid *grid, size_t from, uint64_t key)
 }
 
 typedef struct run {
-    size_t cell; /* where the last search for this row of cells ended */
+    size_t cell; /* where the last lookup in this row of cells ended: the next query cell is near */
     size_t begin, end;
 } run;
 
-/* The runs of source slots around a query cell. */
+/* The runs of source slots around a query cell: three cells along x each, for every (dz, dy). */
 static int find_runs(const ascc_rows *rows, uint64_t key, run *runs)
 {
     const ascc_grid *grid = rows->source_grid;
@@ -263,7 +264,7 @@ static bool row_wanted(const rows_job *job, size_t row)
     return job->rows->count[row] == ASCC_ROW_ABSENT && (!job->wanted || job->wanted[row]);
 }
 
-/* Rows of the queries in cells [begin, end). */
+/* Lists of the queries in cells [begin, end). */
 static void make_rows(void *data, size_t begin, size_t end, int32_t slot)
 {
     rows_job *job = data;
@@ -298,7 +299,7 @@ static void make_rows(void *data, size_t begin, size_t end, int32_t slot)
     tell(job, &set_aside);
 }
 
-/* One pass over all query cells; the rows that did not fit are left absent. */
+/* One pass over all query cells; the lists that did not fit are left absent. */
 static ascc_status rows_pass(rows_job *job)
 {
     const ascc_rows *rows = job->rows;
@@ -337,7 +338,7 @@ static void drop_one_sided(void *data, size_t begin, size_t end, int32_t slot)
 ascc_status ascc_rows_make(ascc_rows *rows, const ascc_search_tools *tools, const uint8_t *wanted)
 {
     const bool mutual = rows->limit && rows->same;
-    if (mutual) { /* whom a row keeps depends on all other rows */
+    if (mutual) { /* whom a list keeps depends on all others */
         wanted = NULL;
         if (rows->neighbor)
             return ASCC_OK;
@@ -359,7 +360,7 @@ ascc_status ascc_rows_make(ascc_rows *rows, const ascc_search_tools *tools, cons
     ascc_status status = rows_pass(&job);
     size_t needed = atomic_load(&job.used);
     while (status == ASCC_OK && needed > rows->capacity) {
-        rows->used = rows->capacity; /* whole rows below it are kept, with holes at the end */
+        rows->used = rows->capacity; /* whole lists below it are kept, with holes at the end */
         if (!rows_reserve(rows, tools->arena, needed + needed / 8))
             return ascc_fail(tools->message, ASCC_ERROR_MEMORY, "no memory for %zu neighbours",
                              needed);

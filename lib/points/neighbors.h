@@ -7,9 +7,11 @@
 
 #include "grid.h"
 
+/* The count of a list that is not made. */
 #define ASCC_ROW_ABSENT UINT32_MAX
 
-/* Neighbours of query points among source points, made on demand for the rows that are asked for. */
+/* Neighbour lists of query points among source points, in compressed rows: each made when it is first
+ * asked for. Row i of the query set has neighbor[start[i] ..], count[i] of them, in the order of cells. */
 typedef struct ascc_rows {
     const ascc_points *query, *source;
     const ascc_grid *query_grid, *source_grid;
@@ -20,18 +22,18 @@ typedef struct ascc_rows {
     bool skip_self;
     int32_t limit;         /* nearest neighbours kept, mutual if `same`; 0 = all */
     int32_t max_neighbors; /* before LIMIT */
-    uint32_t *count;       /* [query count]; ASCC_ROW_ABSENT = not made */
+    uint32_t *count;       /* [query count] neighbours, or ASCC_ROW_ABSENT */
     size_t *start;         /* [query count] into neighbor */
     uint32_t *neighbor;    /* rows of the source set */
     size_t capacity, used; /* entries there is room for, and set aside */
-    size_t stored;         /* entries that rows hold */
-    uint32_t longest;
+    size_t stored;         /* entries that lists hold */
+    uint32_t longest;      /* list */
 } ascc_rows;
 
-/* Sets up rows without any made. expected: neighbours to make room for at first; 0 = count them first. */
+/* Room for all lists, none of them made. expected: neighbours to make room for at first; 0 = count them first. */
 ascc_status ascc_rows_open(ascc_rows *rows, const ascc_search_tools *tools, size_t expected);
 
-/* Makes the rows of queries with wanted[row] != 0 (NULL = all) that are not made yet.
+/* Makes the lists of queries with wanted[row] != 0 (NULL = all) that are not made yet.
  * errors: MEMORY, LIMIT. */
 ascc_status ascc_rows_make(ascc_rows *rows, const ascc_search_tools *tools, const uint8_t *wanted);
 
