@@ -2,6 +2,7 @@
  * SPDX-License-Identifier: MIT */
 #include <math.h>
 
+#include "support/counting.h"
 #include "support/model_builder.h"
 #include "support/tools.h"
 
@@ -236,6 +237,39 @@ static void strays_fall_and_leave_the_others_with_the_projects_networks(void **s
     }
 }
 
+static void a_steady_step_with_strays_allocates_nothing(void **state)
+{
+    (void)state;
+    for (int dimension = 2; dimension <= 3; dimension++) {
+        size_t size;
+        const model_random r = {.seed = 8, .dimension = dimension, .levels = 3};
+        unsigned char *bytes = model_builder_random(&r, &size);
+        test_memory memory = {0};
+        const ascc_context_options options = test_memory_options(&memory);
+        ascc_context *context;
+        ascc_model *model;
+        ascc_step *step;
+        assert_int_equal(ascc_context_create(&options, &context), ASCC_OK);
+        assert_int_equal(ascc_model_load_memory(context, bytes, size, &model), ASCC_OK);
+        stray strays[8];
+        const scene s = {.dimension = dimension,
+                         .strays = strays,
+                         .stray_count = place_strays(strays, dimension, 1e9)};
+        ascc_particles *p = make_particles(context, &s);
+        assert_int_equal(ascc_step_create(context, model, NULL, &step), ASCC_OK);
+        assert_int_equal(ascc_step_run(step, p, NULL, 3), ASCC_OK);
+        const size_t calls = memory.calls;
+        assert_int_equal(ascc_step_run(step, p, NULL, 3), ASCC_OK);
+        assert_int_equal(memory.calls, calls);
+        ascc_step_destroy(&step);
+        ascc_particles_destroy(&p);
+        ascc_model_destroy(&model);
+        ascc_context_destroy(&context);
+        assert_true(test_memory_is_clean(&memory));
+        free(bytes);
+    }
+}
+
 static void a_stray_beyond_all_numbers_is_named_and_nothing_moves(void **state)
 {
     (void)state;
@@ -268,6 +302,7 @@ int main(void)
         cmocka_unit_test(strays_leave_the_others_with_a_plain_last_layer),
         cmocka_unit_test(strays_fall_where_coarse_points_depend_on_all_particles),
         cmocka_unit_test(strays_fall_and_leave_the_others_with_the_projects_networks),
+        cmocka_unit_test(a_steady_step_with_strays_allocates_nothing),
         cmocka_unit_test(a_stray_beyond_all_numbers_is_named_and_nothing_moves),
     };
     return cmocka_run_group_tests_name("strays", tests, NULL, NULL);
