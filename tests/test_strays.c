@@ -32,7 +32,7 @@ typedef struct result {
 } result;
 
 /* A jittered block over a floor. */
-static size_t block(int dimension, double *x)
+static size_t block(int dimension, double spacing, double *x)
 {
     dice d = {91};
     const int side = dimension == 2 ? 12 : 6;
@@ -43,18 +43,18 @@ static size_t block(int dimension, double *x)
                 const int at[3] = {i, j, k};
                 for (int c = 0; c < dimension; c++)
                     x[n * (size_t)dimension + (size_t)c] =
-                        (at[c] + dice_uniform(&d, -0.1, 0.1)) * SPACING;
+                        (at[c] + dice_uniform(&d, -0.1, 0.1)) * spacing;
             }
     return n;
 }
 
-static size_t floor_below(int dimension, double *x)
+static size_t floor_below(int dimension, double spacing, double *x)
 {
     size_t n = 0;
     for (int k = 0; k < (dimension == 2 ? 1 : 14); k++)
         for (int i = 0; i < 14; i++, n++) {
-            const double at[3] = {(i - 2) * 0.64 * SPACING, -0.7 * SPACING,
-                                  (k - 2) * 0.64 * SPACING};
+            const double at[3] = {(i - 2) * 0.64 * spacing, -0.7 * spacing,
+                                  (k - 2) * 0.64 * spacing};
             memcpy(x + n * (size_t)dimension, at, (size_t)dimension * sizeof *x);
         }
     return n;
@@ -67,10 +67,11 @@ static size_t add_strays(const scene *s, double *x, size_t n)
     return n;
 }
 
-static ascc_particles *make_particles(ascc_context *context, const scene *s)
+static ascc_particles *make_particles(ascc_context *context, double spacing, const scene *s)
 {
     double fluid[MOST * 3], wall[MOST * 3], normal[MOST * 3] = {0};
-    size_t n = block(s->dimension, fluid), walls = floor_below(s->dimension, wall);
+    size_t n = block(s->dimension, spacing, fluid),
+           walls = floor_below(s->dimension, spacing, wall);
     if (s->as_walls)
         walls = add_strays(s, wall, walls);
     else
@@ -78,7 +79,7 @@ static ascc_particles *make_particles(ascc_context *context, const scene *s)
     for (size_t i = 0; i < walls; i++)
         normal[i * (size_t)s->dimension + 1] = 1.0;
     const ascc_particles_options options = {
-        .size = sizeof options, .dimension = s->dimension, .spacing = SPACING, .mass = 0.125};
+        .size = sizeof options, .dimension = s->dimension, .spacing = spacing, .mass = 0.125};
     const ascc_const_array x = {.data = fluid, .scalar = ASCC_DOUBLE},
                            w = {.data = wall, .scalar = ASCC_DOUBLE},
                            normals = {.data = normal, .scalar = ASCC_DOUBLE};
@@ -98,13 +99,13 @@ static void run(result *r, const unsigned char *model, size_t size, const scene 
     memset(r, 0, sizeof *r);
     assert_int_equal(ascc_context_create(&options, &context), ASCC_OK);
     assert_int_equal(ascc_model_load_memory(context, model, size, &m), ASCC_OK);
-    ascc_particles *p = make_particles(context, s);
+    ascc_model_info info = {.size = sizeof info};
+    assert_int_equal(ascc_model_get_info(m, &info), ASCC_OK);
+    ascc_particles *p = make_particles(context, info.particle_spacing, s);
     assert_int_equal(ascc_step_create(context, m, NULL, &step), ASCC_OK);
     const ascc_forces forces = {.size = sizeof forces, .gravity = down};
     if (ascc_step_run(step, p, &forces, STEPS) != ASCC_OK)
         fail_msg("step: %s", ascc_step_message(step));
-    ascc_model_info info = {.size = sizeof info};
-    assert_int_equal(ascc_model_get_info(m, &info), ASCC_OK);
     r->time_step = info.time_step;
     r->quantum = ascc_particles_momentum_quantum(p);
     r->count = ascc_particles_count(p, ASCC_FLUID);
@@ -255,7 +256,7 @@ static void a_steady_step_with_strays_allocates_nothing(void **state)
         const scene s = {.dimension = dimension,
                          .strays = strays,
                          .stray_count = place_strays(strays, dimension, 1e9)};
-        ascc_particles *p = make_particles(context, &s);
+        ascc_particles *p = make_particles(context, SPACING, &s);
         assert_int_equal(ascc_step_create(context, model, NULL, &step), ASCC_OK);
         assert_int_equal(ascc_step_run(step, p, NULL, 3), ASCC_OK);
         const size_t calls = memory.calls;
@@ -282,7 +283,7 @@ static void a_stray_beyond_all_numbers_is_named_and_nothing_moves(void **state)
     assert_int_equal(ascc_model_load_memory(context, bytes, size, &model), ASCC_OK);
     const stray one = {{0.0, 1e10, 0.0}};
     const scene s = {.dimension = 3, .strays = &one, .stray_count = 1};
-    ascc_particles *p = make_particles(context, &s);
+    ascc_particles *p = make_particles(context, SPACING, &s);
     const uint64_t hash = ascc_particles_hash(p);
     assert_int_equal(ascc_step_create(context, model, NULL, &step), ASCC_OK);
     assert_int_equal(ascc_step_run(step, p, NULL, 1), ASCC_ERROR_RANGE);
