@@ -127,15 +127,173 @@ static void sparse_points_far_apart_find_only_near_ones(void **state)
     tools_close(&t);
 }
 
-static void points_beyond_the_numbered_cells_are_an_error(void **state)
+/* Rows of a search must be those of brute force, at any distance from each other. */
+static void check_search(const double *query, size_t queries, const double *source, size_t sources,
+                         int dimension, double radius, int32_t threads)
+{
+    test_tools t;
+    tools_open(&t, threads, 0);
+    search_case s;
+    if (build(&s, &t, query, queries, source, sources, dimension, radius) != ASCC_OK)
+        fail_msg("%s", t.message.text);
+    assert_int_equal(ascc_rows_make(&s.rows, &t.search, NULL), ASCC_OK);
+    check_rows(&s);
+    tools_close(&t);
+}
+
+static void strays_on_every_axis_leave_the_neighbours_of_the_others(void **state)
+{
+    (void)state;
+    dice d = {19};
+    for (int dimension = 2; dimension <= 3; dimension++)
+        for (double far = 1e3; far < 1e10; far *= 10.0) {
+            const size_t n = 240, axes = (size_t)dimension;
+            double *a = cloud(&d, n, dimension, -0.5, 0.5), *b = cloud(&d, n, dimension, -0.5, 0.5);
+            for (size_t i = 0; i < 24; i++) { /* pairs, on one axis or on all, on both sides */
+                const size_t axis = i / 2 % 4;
+                for (size_t c = 0; c < axes; c++)
+                    if (axis == 3 || axis == c)
+                        a[i * axes + c] += i < 12 ? far : -far;
+                if (i % 3)
+                    memcpy(b + i * axes, a + i * axes, axes * sizeof *b);
+            }
+            check_search(a, n, NULL, 0, dimension, 0.1, 1);
+            check_search(a, n, b, n, dimension, 0.1, 3);
+            check_search(b, n, a, n, dimension, 0.1, 1);
+            free(a);
+            free(b);
+        }
+}
+
+/* Gaps of no cell, of one, of two and of many, between points that only one of the sets may have. */
+static void gaps_of_any_width_keep_neighbours_and_make_none(void **state)
+{
+    (void)state;
+    dice d = {23};
+    for (int round = 0; round < 60; round++) {
+        const int dimension = 2 + round % 2;
+        const size_t n = 60, m = 40;
+        double *x = calloc((n + m) * 3, sizeof *x);
+        double at[3] = {-1e8, -1e8, -1e8};
+        for (size_t i = 0; i < n + m; i++)
+            for (size_t c = 0; c < (size_t)dimension; c++) {
+                static const double step[] = {0.0, 0.05, 0.1, 0.17, 0.25, 0.4, 0.45, 1e3, 4e6};
+                at[c] += step[dice_next(&d) % (round % 3 ? 9 : 7)] * dice_uniform(&d, 0.9, 1.1);
+                x[i * (size_t)dimension + c] = at[c];
+            }
+        for (size_t i = 0; i + 1 < n + m; i++) { /* both sets have some of every place */
+            const size_t j = i + dice_next(&d) % (n + m - i);
+            for (size_t c = 0; c < (size_t)dimension; c++) {
+                const double swap = x[i * (size_t)dimension + c];
+                x[i * (size_t)dimension + c] = x[j * (size_t)dimension + c];
+                x[j * (size_t)dimension + c] = swap;
+            }
+        }
+        check_search(x, n, x + n * (size_t)dimension, m, dimension, 0.1, 1);
+        check_search(x, n + m, NULL, 0, dimension, 0.1, 2);
+        free(x);
+    }
+}
+
+/* Kernels see low words only: a cloud and its copy 2^32 units away look the same to them. */
+static void copies_a_whole_low_word_away_are_no_neighbours(void **state)
+{
+    (void)state;
+    dice d = {37};
+    const size_t n = 40, copies = 12;
+    for (int dimension = 2; dimension <= 3; dimension++)
+        for (int axis = 0; axis < dimension; axis++) {
+            const size_t axes = (size_t)dimension;
+            double *x = calloc(n * copies * axes, sizeof *x);
+            for (size_t i = 0; i < n * axes; i++)
+                x[i] = dice_uniform(&d, -0.5, 0.5);
+            for (size_t k = 1; k < copies; k++) /* a word is 8 m at this radius */
+                for (size_t i = 0; i < n * axes; i++)
+                    x[k * n * axes + i] =
+                        x[i] + (i % axes == (size_t)axis || k % 2 ? ldexp(8.0, (int)k * 5 / 2) : 0);
+            check_search(x, n * copies, NULL, 0, dimension, 0.125, 2);
+            check_search(x, n, x + n * axes, n * (copies - 1), dimension, 0.125, 1);
+            free(x);
+        }
+}
+
+static void strays_leave_the_order_of_the_others(void **state)
+{
+    (void)state;
+    test_tools t;
+    tools_open(&t, 2, 0);
+    dice d = {29};
+    const size_t n = 500, strays = 6;
+    double *x = cloud(&d, n + strays, 3, -1.0, 1.0);
+    for (size_t i = 0; i < strays; i++)
+        for (size_t c = 0; c < 3; c++)
+            x[(n + i) * 3 + c] *= 1e9;
+    const ascc_scale scale = ascc_scale_for_radius(0.2);
+    const ascc_points p = points_of(&t, &scale, x, n, 3),
+                      q = points_of(&t, &scale, x, n + strays, 3);
+    ascc_extent near = ascc_extent_of(&p, t.search.workers),
+                far = ascc_extent_of(&q, t.search.workers);
+    const double cell = ascc_grid_cell(0.2 * scale.inverse);
+    uint32_t a[500], b[506];
+    assert_int_equal(ascc_points_order(&t.search, &p, &near, cell, a), ASCC_OK);
+    assert_int_equal(ascc_points_order(&t.search, &q, &far, cell, b), ASCC_OK);
+    size_t kept = 0;
+    for (size_t i = 0; i < n + strays; i++)
+        if (b[i] < n)
+            assert_int_equal(b[i], a[kept++]);
+    assert_int_equal(kept, n);
+    free(x);
+    tools_close(&t);
+}
+
+static void a_quarter_million_scattered_points_find_themselves(void **state)
+{
+    (void)state;
+    test_tools t;
+    tools_open(&t, 2, 0);
+    const size_t n = (size_t)1 << 18;
+    double *x = calloc(n * 3, sizeof *x);
+    for (size_t i = 0; i < n * 3; i++)
+        x[i] = (double)(i / 3) * 100.0;
+    search_case s;
+    assert_int_equal(build(&s, &t, x, n, NULL, 0, 3, 0.1), ASCC_OK);
+    assert_int_equal(ascc_rows_make(&s.rows, &t.search, NULL), ASCC_OK);
+    for (size_t i = 0; i < n; i++)
+        assert_true(s.rows.count[i] == 1 && s.rows.neighbor[s.rows.start[i]] == i);
+    free(x);
+    tools_close(&t);
+}
+
+/* Two numbers for each of 2^20 points, and 22 bits on each axis: what a key cannot hold. */
+static void more_scattered_points_than_keys_can_number_are_an_error(void **state)
+{
+    (void)state;
+    test_tools t;
+    tools_open(&t, 2, 0);
+    const size_t n = ((size_t)1 << 20) + 8;
+    double *x = calloc(n * 3, sizeof *x);
+    for (size_t i = 0; i < n * 3; i++)
+        x[i] = (double)(i / 3) * 100.0;
+    search_case s;
+    assert_int_equal(build(&s, &t, x, n, NULL, 0, 3, 0.1), ASCC_ERROR_RANGE);
+    assert_non_null(strstr(t.message.text, "scattered over too many cells"));
+    free(x);
+    tools_close(&t);
+}
+
+static void sets_of_2_to_the_32_points_are_an_error(void **state)
 {
     (void)state;
     test_tools t;
     tools_open(&t, 1, 0);
-    double x[6] = {-1e9, -1e9, -1e9, 1e9, 1e9, 1e9};
-    search_case s;
-    assert_int_equal(build(&s, &t, x, 2, NULL, 0, 3, 0.1), ASCC_ERROR_RANGE);
-    assert_true(strstr(t.message.text, "cells") != NULL);
+    double x[3] = {0};
+    const ascc_scale scale = ascc_scale_for_radius(0.1);
+    ascc_points p = points_of(&t, &scale, x, 1, 3);
+    ascc_extent extent = ascc_extent_of(&p, t.search.workers);
+    ascc_grid grid;
+    p.count = UINT32_MAX;
+    assert_int_equal(ascc_grid_build(&grid, &t.search, &p, &extent, 1e6, false), ASCC_ERROR_RANGE);
+    assert_non_null(strstr(t.message.text, "4294967295 points"));
     tools_close(&t);
 }
 
@@ -265,7 +423,7 @@ static void the_order_of_points_follows_from_positions_alone(void **state)
     ascc_extent_start(&extent);
     ascc_extent_add(&extent, &p);
     wide = extent; /* one far point changes the box, not the order */
-    wide.high[0] += (int64_t)1 << 40;
+    wide.box[0].high += (int64_t)1 << 40;
     const double cell = ascc_grid_cell(0.2 * scale.inverse);
     assert_int_equal(ascc_points_order(&t.search, &p, &extent, cell, a), ASCC_OK);
     assert_int_equal(ascc_points_order(&t.search, &q, &wide, cell, b), ASCC_OK);
@@ -321,7 +479,13 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(rows_equal_brute_force_in_2d_and_3d),
         cmocka_unit_test(sparse_points_far_apart_find_only_near_ones),
-        cmocka_unit_test(points_beyond_the_numbered_cells_are_an_error),
+        cmocka_unit_test(strays_on_every_axis_leave_the_neighbours_of_the_others),
+        cmocka_unit_test(gaps_of_any_width_keep_neighbours_and_make_none),
+        cmocka_unit_test(copies_a_whole_low_word_away_are_no_neighbours),
+        cmocka_unit_test(strays_leave_the_order_of_the_others),
+        cmocka_unit_test(a_quarter_million_scattered_points_find_themselves),
+        cmocka_unit_test(more_scattered_points_than_keys_can_number_are_an_error),
+        cmocka_unit_test(sets_of_2_to_the_32_points_are_an_error),
         cmocka_unit_test(coincident_points_are_all_neighbours),
         cmocka_unit_test(too_many_neighbours_are_an_error_not_an_overflow),
         cmocka_unit_test(only_wanted_rows_are_made_and_more_can_follow),

@@ -324,12 +324,32 @@ static void prolongation_of_a_linear_field_is_that_field(void **state)
     }
 }
 
+/* Sizes only: no row is read. The last sum wraps where size_t has 64 bits, the first where it has 32. */
+static void more_than_2_to_the_32_rows_are_an_error(void **state)
+{
+    (void)state;
+    static const size_t counts[][2] = {
+        {UINT32_MAX - 1, 1}, {UINT32_MAX, 0}, {1, UINT32_MAX}, {SIZE_MAX, 2}, {2, SIZE_MAX}};
+    const model_random random = {.seed = 3, .bumps = 2, .order = 1};
+    network_case c;
+    open_case(&c, &random, false);
+    for (size_t i = 0; i < sizeof counts / sizeof *counts; i++) {
+        const ascc_scene scene = {counts[i][0], counts[i][1], NULL, NULL};
+        ascc_hierarchy h;
+        assert_int_equal(ascc_hierarchy_build(&h, &c.tools.search, &c.model->plan, &scene),
+                         ASCC_ERROR_RANGE);
+        assert_non_null(strstr(c.tools.message.text, "are more than 2^32 - 2"));
+    }
+    close_case(&c);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(layers_in_a_basis_equal_doubles),
         cmocka_unit_test(transfers_equal_doubles),
         cmocka_unit_test(prolongation_of_a_linear_field_is_that_field),
+        cmocka_unit_test(more_than_2_to_the_32_rows_are_an_error),
     };
     return cmocka_run_group_tests_name("network", tests, NULL, NULL);
 }

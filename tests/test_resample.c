@@ -186,7 +186,57 @@ static void farthest_points_are_each_the_farthest_from_those_before(void **state
     tools_close(&t);
 }
 
-static void voxels_beyond_the_numbered_are_an_error(void **state)
+/* The samples of a cloud with strays are those of the cloud, in their order, and those of the strays. */
+static void strays_leave_the_voxels_of_the_others(void **state)
+{
+    (void)state;
+    dice d = {26};
+    for (int round = 0; round < 24; round++) {
+        test_tools t;
+        tools_open(&t, 1 + round % 3, 0);
+        const int dimension = 2 + round % 2, corners = round / 2 % 3; /* 2: with hysteresis */
+        const double far = pow(10.0, 2 + round / 3);
+        const size_t n = 300, strays = 5, axes = (size_t)dimension;
+        double *x = cloud(&d, n + strays, dimension, -0.4, 0.3);
+        for (size_t i = 0; i < n * axes; i += 7) /* gaps within a wide voxel, and next to it */
+            x[i] += 3.0 * (double)(i % 5);
+        for (size_t i = 0; i < strays; i++)
+            for (size_t c = 0; c < axes; c++)
+                if (i % axes == c || i >= 3)
+                    x[(n + i) * axes + c] += i % 2 ? far : -far;
+        const ascc_scale scale = ascc_scale_for_radius(0.4);
+        const ascc_points both = points_of(&t, &scale, x, n + strays, dimension),
+                          near = points_of(&t, &scale, x, n, dimension),
+                          away = points_of(&t, &scale, x + n * axes, strays, dimension);
+        const ascc_points *from[3] = {&both, &near, &away};
+        const double voxel = (round / 2 % 2 ? 0.1 : 4.0) * scale.inverse;
+        ascc_points s[3];
+        for (int k = 0; k < 3; k++)
+            assert_int_equal(
+                corners ? ascc_sample_corners(&s[k], &t.search, from[k], dimension, voxel,
+                                              0.1 * (corners - 1), (const double[3]){0.0, 0.0, 0.0})
+                        : ascc_sample_centers(&s[k], &t.search, from[k], dimension, voxel),
+                ASCC_OK);
+        assert_int_equal(s[0].count, s[1].count + s[2].count);
+        size_t next[3] = {0, 0, 0};
+        for (size_t i = 0; i < s[0].count; i++) {
+            int owner = 0;
+            for (int k = 1; k < 3; k++) {
+                bool same = next[k] < s[k].count;
+                for (int c = 0; c < 3 && same; c++)
+                    same = s[k].position[c][next[k]] == s[0].position[c][i] &&
+                           s[k].low[c][next[k]] == s[0].low[c][i];
+                owner = same ? k : owner;
+            }
+            assert_true(owner);
+            next[owner]++;
+        }
+        free(x);
+        tools_close(&t);
+    }
+}
+
+static void voxels_too_fine_or_too_wide_to_count_are_an_error(void **state)
 {
     (void)state;
     test_tools t;
@@ -194,8 +244,11 @@ static void voxels_beyond_the_numbered_are_an_error(void **state)
     double x[6] = {-1e9, -1e9, -1e9, 1e9, 1e9, 1e9};
     const ascc_scale scale = ascc_scale_for_radius(0.4);
     const ascc_points p = points_of(&t, &scale, x, 2, 3);
+    const double anchor[3] = {0.0, 0.0, 0.0};
     ascc_points s;
-    assert_int_equal(ascc_sample_centers(&s, &t.search, &p, 3, 0.1 * scale.inverse),
+    assert_int_equal(ascc_sample_centers(&s, &t.search, &p, 3, 0.01), ASCC_ERROR_RANGE);
+    assert_non_null(strstr(t.message.text, "voxels of 0.01 units"));
+    assert_int_equal(ascc_sample_corners(&s, &t.search, &p, 3, 1e30, 0.1, anchor),
                      ASCC_ERROR_RANGE);
     tools_close(&t);
 }
@@ -277,7 +330,8 @@ int main(void)
         cmocka_unit_test(corners_are_those_of_both_shifted_cells),
         cmocka_unit_test(the_centroid_is_exact_whatever_the_order),
         cmocka_unit_test(farthest_points_are_each_the_farthest_from_those_before),
-        cmocka_unit_test(voxels_beyond_the_numbered_are_an_error),
+        cmocka_unit_test(strays_leave_the_voxels_of_the_others),
+        cmocka_unit_test(voxels_too_fine_or_too_wide_to_count_are_an_error),
         cmocka_unit_test(density_near_a_wall_stays_within_2_percent_when_downsampled),
     };
     return cmocka_run_group_tests_name("resample", tests, NULL, NULL);

@@ -338,6 +338,24 @@ static void a_thread_that_does_not_start_is_an_error_that_leaks_nothing(void **s
     }
 }
 
+static void a_lock_that_is_not_made_is_an_error_that_leaks_nothing(void **state)
+{
+    (void)state;
+    for (int made = 0; made < 3; made++) { /* a mutex, then two conditions */
+        test_memory memory = {0};
+        const ascc_allocator allocator = test_memory_allocator(&memory);
+        ascc_workers *workers;
+        test_locks_held = 0;
+        test_locks_until_failure = made;
+        const ascc_status status = ascc_workers_create(&allocator, 2, NULL, NULL, NULL, &workers);
+        test_locks_until_failure = -1;
+        assert_int_equal(status, ASCC_ERROR_MEMORY);
+        assert_null(workers);
+        assert_int_equal(test_locks_held, 0);
+        assert_true(test_memory_is_clean(&memory));
+    }
+}
+
 static void without_memory_there_are_no_workers(void **state)
 {
     (void)state;
@@ -368,6 +386,7 @@ int main(void)
         cmocka_unit_test(callers_on_several_threads_do_not_disturb_each_other),
         cmocka_unit_test(a_job_may_run_another),
         cmocka_unit_test(a_thread_that_does_not_start_is_an_error_that_leaks_nothing),
+        cmocka_unit_test(a_lock_that_is_not_made_is_an_error_that_leaks_nothing),
         cmocka_unit_test(without_memory_there_are_no_workers),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -6,7 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "points/neighbors.h"
+#include "points/search.h"
 
 #define MOST_NEIGHBORS 4096
 
@@ -14,7 +14,8 @@ typedef struct near_state {
     near_lists lists; /* first, so that a pointer to one is a pointer to the other */
     ascc_context *context;
     ascc_arena arena;
-    double (*built)[3]; /* moving positions when the lists were made, in the arena */
+    double
+        *built; /* [points][dimension], when the lists were made, in the arena; moving ones first */
     bool valid;
 } near_state;
 
@@ -59,12 +60,13 @@ bool near_current(const near_lists *lists, size_t moving, const double *position
 {
     const near_state *n = (const near_state *)lists;
     const double half = 0.5 * lists->options.skin;
+    const size_t d = (size_t)lists->options.dimension;
     if (!n->valid || moving != lists->moving)
         return false;
     for (size_t i = 0; i < moving; i++) {
         double square = 0.0;
-        for (int c = 0; c < lists->options.dimension; c++) {
-            const double moved = position[i * stride + (size_t)c] - n->built[i][c];
+        for (size_t c = 0; c < d; c++) {
+            const double moved = position[i * stride + c] - n->built[i * d + c];
             square += moved * moved;
         }
         if (!(square < half * half))
@@ -138,28 +140,18 @@ static bool make_ghosts(near_state *n, const double *position, size_t stride)
 
 /* ---- Lists ---- */
 
-static ascc_status place_points(near_state *n, const double *position, size_t stride,
-                                ascc_points *points, const ascc_scale *scale)
+/* All points at their places: moving, fixed, ghosts. */
+static bool place_points(near_state *n, const double *position, size_t stride)
 {
-    near_lists *l = &n->lists;
-    const size_t own = l->moving + l->fixed;
-    n->built = ascc_arena_take(&n->arena, l->moving, sizeof *n->built);
-    if (!ascc_points_take(points, &n->arena, own + l->ghosts) || !n->built)
-        return ascc_fail(&l->message, ASCC_ERROR_MEMORY, "no memory for %zu points", own);
-    for (size_t i = 0; i < points->count; i++) {
-        int64_t at[3] = {0};
-        const size_t source = i < own ? i : l->owner[i - own];
-        for (int c = 0; c < l->options.dimension; c++) {
-            const double x = position[source * stride + (size_t)c];
-            if (!ascc_scale_apply(scale, x + (i < own ? 0.0 : l->shift[i - own][c]), &at[c]))
-                return ascc_fail(&l->message, ASCC_ERROR_RANGE,
-                                 "point %zu is not finite or too far from the origin", source);
-            if (i < l->moving)
-                n->built[i][c] = x;
-        }
-        ascc_points_set(points, i, at);
-    }
-    return ASCC_OK;
+    const near_lists *l = &n->lists;
+    const size_t d = (size_t)l->options.dimension, own = l->moving + l->fixed;
+    n->built = ascc_arena_take(&n->arena, (own + l->ghosts) * d, sizeof *n->built);
+    for (size_t i = 0; n->built && i < own + l->ghosts; i++)
+        for (size_t c = 0; c < d; c++)
+            n->built[i * d + c] =
+                i < own ? position[i * stride + c]
+                        : position[l->owner[i - own] * stride + c] + l->shift[i - own][c];
+    return n->built != NULL;
 }
 
 /* Rows of the fixed points: the moving rows turned round, moving points ascending. */
@@ -193,39 +185,33 @@ static ascc_status turn_rows(near_state *n, const ascc_rows *rows)
     return ASCC_OK;
 }
 
-static ascc_status search(near_state *n, const ascc_points *points, double radius)
+static ascc_status search(near_state *n)
 {
     near_lists *l = &n->lists;
     const ascc_search_tools tools = {&n->arena, n->context->workers, &n->context->kernels,
                                      &l->message};
-    uint8_t *wanted = ascc_arena_take(&n->arena, points->count, 1);
-    ascc_extent extent;
-    ascc_extent_start(&extent);
-    ascc_extent_add(&extent, points);
-    ascc_grid grid;
-    ascc_rows rows = {.query = points,
-                      .source = points,
-                      .query_grid = &grid,
-                      .source_grid = &grid,
-                      .radius = radius,
-                      .same = true,
-                      .skip_self = true,
-                      .max_neighbors = MOST_NEIGHBORS};
+    const size_t count = l->moving + l->fixed + l->ghosts;
+    uint8_t *wanted = ascc_arena_take(&n->arena, count, 1);
     if (!wanted)
-        return ascc_fail(&l->message, ASCC_ERROR_MEMORY, "no memory for %zu points", points->count);
-    for (size_t i = 0; i < points->count; i++)
+        return ascc_fail(&l->message, ASCC_ERROR_MEMORY, "no memory for %zu points", count);
+    for (size_t i = 0; i < count; i++)
         wanted[i] = i < l->moving;
-    ascc_status status = ascc_grid_build(&grid, &tools, points, &extent, radius, false);
-    if (status == ASCC_OK)
-        status = ascc_rows_open(&rows, &tools, l->moving * (l->options.dimension == 3 ? 160 : 40));
-    if (status == ASCC_OK)
-        status = ascc_rows_make(&rows, &tools, wanted);
+    const ascc_search_options within = {.dimension = l->options.dimension,
+                                        .radius = l->options.radius + l->options.skin,
+                                        .query = {.at = n->built, .count = count},
+                                        .skip_self = true,
+                                        .max_neighbors = MOST_NEIGHBORS,
+                                        .expected =
+                                            l->moving * (l->options.dimension == 3 ? 160 : 40),
+                                        .wanted = wanted};
+    ascc_search near;
+    const ascc_status status = ascc_search_run(&near, &tools, &within);
     if (status != ASCC_OK)
         return status;
-    l->start = rows.start;
-    l->count = rows.count;
-    l->index = rows.neighbor;
-    return turn_rows(n, &rows);
+    l->start = near.rows.start;
+    l->count = near.rows.count;
+    l->index = near.rows.neighbor;
+    return turn_rows(n, &near.rows);
 }
 
 ascc_status near_update(near_lists *lists, size_t moving, size_t fixed, const double *position,
@@ -239,12 +225,9 @@ ascc_status near_update(near_lists *lists, size_t moving, size_t fixed, const do
     if (!make_ghosts(n, position, stride))
         return ascc_fail(&lists->message, ASCC_ERROR_MEMORY, "no memory for ghosts of %zu points",
                          moving);
-    const double reach = lists->options.radius + lists->options.skin;
-    const ascc_scale scale = ascc_scale_for_radius(reach);
-    ascc_points points;
-    ascc_status status = place_points(n, position, stride, &points, &scale);
-    if (status == ASCC_OK)
-        status = search(n, &points, reach * scale.inverse);
+    if (!place_points(n, position, stride))
+        return ascc_fail(&lists->message, ASCC_ERROR_MEMORY, "no memory for %zu points", moving);
+    const ascc_status status = search(n);
     n->valid = status == ASCC_OK;
     lists->rebuilds += n->valid;
     return status;

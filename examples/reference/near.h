@@ -3,7 +3,7 @@
  *
  * Points are [ moving | fixed | ghosts ]: moving and fixed ones are the caller's, ghosts are copies of
  * moving points across the faces of a periodic box. Lists hold every point within radius + skin, so a
- * sweep tests the distance itself. Order of a list: as lib/neighbors.h, from positions alone.
+ * sweep tests the distance itself. Order of a list: as lib/points/grid.h, from positions alone.
  */
 #ifndef REFERENCE_NEAR_H
 #define REFERENCE_NEAR_H

@@ -494,7 +494,8 @@ typedef struct ascc_forces {
  * errors    ARGUMENT, MISMATCH (dimension; a spacing that is not the model's), MEMORY (scratch had to
  *           grow), NOT_FINITE, RANGE, LIMIT.
  *           Each step is a transaction: on error the set is, bit for bit, as after the last step that
- *           succeeded; ascc_step_statistics says how many did.
+ *           succeeded; ascc_step_statistics says how many did. Particles may be up to 3e10 of the
+ *           model's largest radius from the origin; RANGE names the row of one that is farther.
  * cost      O(neighbour pairs). Scratch grows to the largest scene seen and is then reused.
  * promise   With an antisymmetric last layer: the integer momentum of the fluid changes by the
  *           external impulse and by what walls received, and by nothing else. Same input, same bits

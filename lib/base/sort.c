@@ -1,4 +1,4 @@
-/* Radix sort from the lowest digit up, each pass in parts: the digits of a part are counted, so each
+/* A heap sort of anything; a radix sort of keys from the lowest digit up, each pass in parts: the digits of a part are counted, so each
  * part knows where its keys go. SPDX-License-Identifier: MIT
  *
  *     keys   [ part 0 | part 1 | part 2 ]
@@ -10,6 +10,58 @@
 
 #define SMALLEST_PART 4096
 #define DIGIT_BITS 11 /* at most */
+
+/* ---- In place ---- */
+
+#define LARGEST_ELEMENT 16 /* bytes */
+
+typedef struct heap {
+    unsigned char *array;
+    size_t size; /* of an element */
+    bool (*before)(const void *context, const void *a, const void *b);
+    const void *context;
+} heap;
+
+static bool is_before(const heap *h, size_t a, size_t b)
+{
+    return h->before(h->context, h->array + a * h->size, h->array + b * h->size);
+}
+
+static void exchange(const heap *h, size_t a, size_t b)
+{
+    unsigned char kept[LARGEST_ELEMENT];
+    memcpy(kept, h->array + a * h->size, h->size);
+    memmove(h->array + a * h->size, h->array + b * h->size, h->size);
+    memcpy(h->array + b * h->size, kept, h->size);
+}
+
+/* Restores the heap order (a parent is not before its children) under `root`. */
+static void sift(const heap *h, size_t root, size_t count)
+{
+    for (size_t child; (child = 2 * root + 1) < count; root = child) {
+        if (child + 1 < count && is_before(h, child, child + 1))
+            child++;
+        if (!is_before(h, root, child))
+            return;
+        exchange(h, root, child);
+    }
+}
+
+void ascc_heap_sort(void *array, size_t count, size_t size,
+                    bool (*before)(const void *context, const void *a, const void *b),
+                    const void *context)
+{
+    assert(size <= LARGEST_ELEMENT);
+    const heap h = {array, size, before, context};
+    for (size_t root = count / 2; root-- > 0;)
+        sift(&h, root, count);
+    for (size_t last = count; last-- > 1;) {
+        exchange(&h, 0, last);
+        sift(&h, 0, last);
+    }
+}
+
+/* ---- Keys ---- */
 
 size_t ascc_part_size(size_t count)
 {

@@ -1,9 +1,20 @@
-/* Sorts integer keys on all workers; the result depends on the keys alone.
+/* Sorts: integer keys on all workers, anything else in place. The result depends on the input alone.
  * SPDX-License-Identifier: MIT */
 #ifndef ASCC_SORT_H
 #define ASCC_SORT_H
 
 #include "workers.h"
+
+/* ---- Any array, in place, by one thread ---- */
+
+/* Sorts as qsort does, element by `before` (true: a must come before b), but with a context and a bound:
+ * heap sort, O(count log count) for any input, no recursion, no memory. Elements take at most 16 bytes;
+ * equal ones may change order. */
+void ascc_heap_sort(void *array, size_t count, size_t size,
+                    bool (*before)(const void *context, const void *a, const void *b),
+                    const void *context);
+
+/* ---- Integer keys, on all workers ---- */
 
 typedef struct ascc_keys {
     size_t count;

@@ -4,6 +4,8 @@
 #include <float.h>
 #include <string.h>
 
+#include "base/sort.h"
+
 #define NONE UINT32_MAX
 
 typedef struct parser {
@@ -518,21 +520,9 @@ static int compare(const ascc_json *json, uint32_t a, uint32_t b)
     return strcmp(x->name, y->name);
 }
 
-static void sift(const ascc_json *json, uint32_t *heap, size_t root, size_t count)
+static bool member_before(const void *json, const void *a, const void *b)
 {
-    for (;;) {
-        size_t child = 2 * root + 1;
-        if (child >= count)
-            return;
-        if (child + 1 < count && compare(json, heap[child], heap[child + 1]) < 0)
-            child++;
-        if (compare(json, heap[root], heap[child]) >= 0)
-            return;
-        const uint32_t swap = heap[root];
-        heap[root] = heap[child];
-        heap[child] = swap;
-        root = child;
-    }
+    return compare(json, *(const uint32_t *)a, *(const uint32_t *)b) < 0;
 }
 
 static ascc_status refuse_duplicates(const ascc_json *json, ascc_message *message)
@@ -544,14 +534,7 @@ static ascc_status refuse_duplicates(const ascc_json *json, ascc_message *messag
     for (size_t i = 1; i < json->count; i++)
         if (json->value[json->value[i].parent].kind == ASCC_JSON_OBJECT)
             key[count++] = (uint32_t)i;
-    for (size_t i = count / 2; i-- > 0;)
-        sift(json, key, i, count);
-    for (size_t i = count; i-- > 1;) {
-        const uint32_t swap = key[0];
-        key[0] = key[i];
-        key[i] = swap;
-        sift(json, key, 0, i);
-    }
+    ascc_heap_sort(key, count, sizeof *key, member_before, json);
     ascc_status status = ASCC_OK;
     for (size_t i = 1; i < count && status == ASCC_OK; i++)
         if (compare(json, key[i - 1], key[i]) == 0)

@@ -7,6 +7,8 @@
 
 #include "points/resample.h"
 
+_Static_assert(ASCC_MAX_LEVELS <= ASCC_EXTENT_SETS, "an extent takes level 0 and all coarser ones");
+
 /* Which boundary particles the network sees: those within the crop of the fluid's bounding box. */
 static size_t keep_boundary(uint32_t *kept, const ascc_plan *plan, const ascc_scene *scene)
 {
@@ -164,6 +166,7 @@ static ascc_status build_level_zero(ascc_hierarchy *h, const ascc_search_tools *
     ascc_workers_run(tools->workers, count, job.part, gather, &job);
     (void)ascc_part_sums(job.first);
     ascc_workers_run(tools->workers, count, job.part, split, &job);
+    h->extent.set[0] = &h->set[ASCC_SET_ALL]; /* the same points, where they stay */
     ascc_arena_return(arena, mark);
     return ASCC_OK;
 }
@@ -195,8 +198,11 @@ ascc_status ascc_hierarchy_build(ascc_hierarchy *h, const ascc_search_tools *too
     h->scale = ascc_scale_for_radius(largest);
     h->base_radius = smallest * h->scale.inverse;
     h->fluid_count = scene->fluid_count;
-    if (scene->fluid_count + scene->boundary_count >= UINT32_MAX)
-        return ascc_fail(tools->message, ASCC_ERROR_RANGE, "more than 2^32 particles");
+    if (scene->fluid_count >= UINT32_MAX ||
+        scene->boundary_count >= UINT32_MAX - scene->fluid_count)
+        return ascc_fail(tools->message, ASCC_ERROR_RANGE,
+                         "%zu fluid and %zu boundary rows are more than 2^32 - 2",
+                         scene->fluid_count, scene->boundary_count);
     ascc_status status = build_level_zero(h, tools, plan, scene);
     for (int level = 1; status == ASCC_OK && level < plan->level_count; level++)
         status = build_level(h, tools, plan, level);

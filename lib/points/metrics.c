@@ -3,8 +3,8 @@
 #include <math.h>
 #include <string.h>
 
-#include "neighbors.h"
 #include "particles.h"
+#include "search.h"
 
 _Static_assert(sizeof(void *) != 8 || sizeof(ascc_measures) == 144, "released layout");
 
@@ -54,36 +54,19 @@ static void measure_motion(const ascc_particles *p, ascc_measures *m)
     }
 }
 
-static ascc_status convert(const ascc_particles *p, const ascc_scale *scale, ascc_points *points,
-                           ascc_message *message)
+/* Densities relative to a lattice at rest, and distances, of all lists within two spacings. */
+static void measure_lists(const ascc_search *near, const ascc_particles *p, ascc_measures *m)
 {
-    const size_t d = (size_t)p->dimension;
-    for (size_t i = 0; i < p->fluid_count; i++) {
-        int64_t at[3] = {0};
-        for (size_t c = 0; c < d; c++)
-            if (!ascc_scale_apply(scale, p->position[i * d + c], &at[c]))
-                return ascc_fail(message, ASCC_ERROR_RANGE,
-                                 "fluid row %zu is too far from the origin", i);
-        ascc_points_set(points, i, at);
-    }
-    return ASCC_OK;
-}
-
-static void measure_rows(const ascc_particles *p, const ascc_rows *rows, ascc_measures *m)
-{
-    const double radius = rows->radius, rest = lattice_sum(p->dimension);
+    const ascc_rows *rows = &near->rows;
+    const double rest = lattice_sum(p->dimension);
     double nearest = INFINITY, sum = 0.0;
     for (size_t i = 0; i < rows->query->count; i++) {
         double density = 0.0;
         bool close = false;
         for (uint32_t k = 0; k < rows->count[i]; k++) {
             const uint32_t j = rows->neighbor[rows->start[i] + k];
-            double square = 0.0;
-            for (int c = 0; c < 3; c++) {
-                const double e =
-                    (double)(rows->source->position[c][j] - rows->query->position[c][i]) / radius;
-                square += e * e;
-            }
+            double e[3];
+            const double square = ascc_search_separation(near, i, j, e);
             density += poly6(square);
             if (j == i)
                 continue;
@@ -102,33 +85,13 @@ static ascc_status measure_density(const ascc_particles *p, ascc_arena *arena, a
                                    ascc_message *message)
 {
     const ascc_search_tools tools = {arena, p->context->workers, &p->context->kernels, message};
-    const double radius = 2.0 * p->spacing;
-    const ascc_scale scale = ascc_scale_for_radius(radius);
-    ascc_points points;
-    if (!ascc_points_take(&points, arena, p->fluid_count))
-        return ascc_fail(message, ASCC_ERROR_MEMORY, "no memory to measure %zu particles",
-                         p->fluid_count);
-    ascc_status status = convert(p, &scale, &points, message);
-    if (status != ASCC_OK)
-        return status;
-    ascc_extent extent;
-    ascc_extent_start(&extent);
-    ascc_extent_add(&extent, &points);
-    ascc_grid grid;
-    ascc_rows rows = {.query = &points,
-                      .source = &points,
-                      .query_grid = &grid,
-                      .source_grid = &grid,
-                      .radius = radius * scale.inverse,
-                      .same = true,
-                      .max_neighbors = 1 << 20};
-    status = ascc_grid_build(&grid, &tools, &points, &extent, rows.radius, false);
+    const ascc_search_options within = {.dimension = p->dimension,
+                                        .radius = 2.0 * p->spacing,
+                                        .query = {p->position, p->fluid_count, "fluid row"}};
+    ascc_search near;
+    const ascc_status status = ascc_search_run(&near, &tools, &within);
     if (status == ASCC_OK)
-        status = ascc_rows_open(&rows, &tools, p->fluid_count * 36);
-    if (status == ASCC_OK)
-        status = ascc_rows_make(&rows, &tools, NULL);
-    if (status == ASCC_OK)
-        measure_rows(p, &rows, m);
+        measure_lists(&near, p, m);
     return status;
 }
 

@@ -2,7 +2,9 @@
 #include "resample.h"
 
 #include <math.h>
-#include <string.h>
+
+#define LARGEST_VOXEL 9007199254740992.0 /* 2^53 units: 2^26 of the largest radius */
+#define MOST_VOXELS 4.6e18               /* from the anchor on, each way; below 2^62 */
 
 void ascc_centroid(const ascc_points *points, double center[3])
 {
@@ -20,10 +22,10 @@ void ascc_centroid(const ascc_points *points, double center[3])
     }
 }
 
-/* Voxels as keys: z, y, x from the highest bits down, counted from the lowest of each. */
+/* Voxels as keys: z, y, x from the highest bits down. */
 typedef struct voxels {
-    int64_t low[3];
-    int shift_y, shift_z, bits;
+    ascc_axis axis[3];
+    int shift[4];
     ascc_keys keys;
 } voxels;
 
@@ -32,26 +34,13 @@ static ascc_status no_memory(const ascc_search_tools *tools)
     return ascc_fail(tools->message, ASCC_ERROR_MEMORY, "no memory for voxels");
 }
 
-static int width_of(int64_t low, int64_t high)
+/* Keys for `each` voxels of `count` points, lent. errors: MEMORY, RANGE. */
+static ascc_status lend_voxels(voxels *v, const ascc_search_tools *tools, size_t count, size_t each)
 {
-    int bits = 0;
-    for (uint64_t span = (uint64_t)high - (uint64_t)low; span; span >>= 1)
-        bits++;
-    return bits;
-}
-
-/* Keys for the voxels from low to high. errors: RANGE. */
-static ascc_status lay_out(voxels *v, const ascc_search_tools *tools, const int64_t low[3],
-                           const int64_t high[3])
-{
-    memcpy(v->low, low, sizeof v->low);
-    v->shift_y = width_of(low[0], high[0]);
-    v->shift_z = v->shift_y + width_of(low[1], high[1]);
-    v->bits = v->shift_z + width_of(low[2], high[2]);
-    if (v->bits > 64)
-        return ascc_fail(tools->message, ASCC_ERROR_RANGE,
-                         "the points span too many voxels to number them");
-    return ASCC_OK;
+    if (count > (UINT32_MAX - 1) / each)
+        return ascc_fail(tools->message, ASCC_ERROR_RANGE, "%zu points take up too many voxels",
+                         count);
+    return ascc_keys_lend(&v->keys, tools->arena, count * each, false) ? ASCC_OK : no_memory(tools);
 }
 
 static inline uint64_t shifted(uint64_t x, int shift)
@@ -61,8 +50,10 @@ static inline uint64_t shifted(uint64_t x, int shift)
 
 static inline uint64_t voxel_key(const voxels *v, const int64_t at[3])
 {
-    return (uint64_t)(at[0] - v->low[0]) | shifted((uint64_t)(at[1] - v->low[1]), v->shift_y) |
-           shifted((uint64_t)(at[2] - v->low[2]), v->shift_z);
+    uint64_t key = 0;
+    for (int c = 0; c < 3; c++)
+        key |= shifted(ascc_axis_number(&v->axis[c], at[c]), v->shift[c]);
+    return key;
 }
 
 static inline uint64_t field(uint64_t key, int from, int to)
@@ -102,6 +93,17 @@ static inline void voxel_of(const voxel_job *job, int c, int64_t position, int64
     }
 }
 
+/* Voxels of a stretch, the corners above included. */
+static void voxels_of(const void *data, int c, int64_t low, int64_t high, int64_t *first,
+                      int64_t *last)
+{
+    const voxel_job *job = data;
+    int64_t other;
+    voxel_of(job, c, low, first, &other);
+    voxel_of(job, c, high, &other, last);
+    *last += job->corners && c < job->dimension;
+}
+
 /* One key for each point, or two. */
 static void make_voxels(void *data, size_t begin, size_t end, int32_t slot)
 {
@@ -124,7 +126,7 @@ static void make_corners(void *data, size_t begin, size_t end, int32_t slot)
     (void)slot;
     const voxel_job *job = data;
     const voxels *v = job->voxels;
-    const uint64_t y = shifted(1, v->shift_y), z = shifted(1, v->shift_z);
+    const uint64_t y = shifted(1, v->shift[1]), z = shifted(1, v->shift[2]);
     const size_t corners = (size_t)1 << job->dimension;
     for (size_t i = begin; i < end; i++)
         for (size_t k = 0; k < corners; k++)
@@ -135,39 +137,52 @@ static void make_corners(void *data, size_t begin, size_t end, int32_t slot)
 /* Sorted voxels without repeats, lent. errors: MEMORY. */
 static ascc_status sort_voxels(voxels *v, const ascc_search_tools *tools, ascc_distinct *distinct)
 {
-    if (!ascc_keys_sort(&v->keys, tools->arena, tools->workers, v->bits) ||
+    if (!ascc_keys_sort(&v->keys, tools->arena, tools->workers, v->shift[3]) ||
         !ascc_keys_distinct(&v->keys, tools->arena, tools->workers, ascc_arena_lend, distinct))
         return no_memory(tools);
     return ASCC_OK;
 }
 
+/* Voxels must be numbers of 64 bits, and their corners positions. */
+static ascc_status check_voxel(const voxel_job *job, const ascc_search_tools *tools,
+                               const ascc_extent *extent)
+{
+    bool good = job->voxel <= LARGEST_VOXEL;
+    for (int c = 0; c < job->dimension && job->points->count; c++)
+        good = good &&
+               fabs((double)extent->box[c].low - job->anchor[c]) / job->voxel < MOST_VOXELS &&
+               fabs((double)extent->box[c].high - job->anchor[c]) / job->voxel < MOST_VOXELS;
+    return good ? ASCC_OK
+                : ascc_fail(tools->message, ASCC_ERROR_RANGE,
+                            "voxels of %g units are too small or too large for these points",
+                            job->voxel);
+}
+
 static ascc_status occupied_voxels(const voxel_job *job, const ascc_search_tools *tools,
                                    ascc_distinct *distinct)
 {
-    const ascc_extent extent = ascc_extent_of(job->points, tools->workers);
-    int64_t low[3] = {0}, high[3] = {0}, other;
-    for (int c = 0; c < job->dimension && job->points->count; c++) {
-        voxel_of(job, c, extent.low[c], &low[c], &other);
-        voxel_of(job, c, extent.high[c], &other, &high[c]);
-        high[c] += job->corners; /* the corner above */
-    }
-    const ascc_status status = lay_out(job->voxels, tools, low, high);
+    voxels *v = job->voxels;
+    const size_t each = job->corners && job->hysteresis != 0.0 ? 2 : 1;
+    ascc_extent extent = ascc_extent_of(job->points, tools->workers);
+    ascc_status status = check_voxel(job, tools, &extent);
+    if (status == ASCC_OK)
+        status = ascc_extent_number(v->axis, v->shift, tools, &extent, voxels_of, job, 0);
+    if (status == ASCC_OK)
+        status = lend_voxels(v, tools, job->points->count, each);
     if (status != ASCC_OK)
         return status;
-    const size_t each = job->corners && job->hysteresis != 0.0 ? 2 : 1;
-    if (!ascc_keys_lend(&job->voxels->keys, tools->arena, each * job->points->count, false))
-        return no_memory(tools);
     ascc_workers_run(tools->workers, job->points->count, 4096, make_voxels, (void *)job);
-    return sort_voxels(job->voxels, tools, distinct);
+    return sort_voxels(v, tools, distinct);
 }
 
 static ascc_status corners_of(voxel_job *job, const ascc_search_tools *tools,
                               const ascc_distinct *occupied, ascc_distinct *distinct)
 {
     job->occupied = occupied;
-    const size_t corners = (size_t)1 << job->dimension;
-    if (!ascc_keys_lend(&job->voxels->keys, tools->arena, corners * occupied->count, false))
-        return no_memory(tools);
+    const ascc_status status =
+        lend_voxels(job->voxels, tools, occupied->count, (size_t)1 << job->dimension);
+    if (status != ASCC_OK)
+        return status;
     ascc_workers_run(tools->workers, occupied->count, 1024, make_corners, job);
     return sort_voxels(job->voxels, tools, distinct);
 }
@@ -188,12 +203,11 @@ static void place(void *data, size_t begin, size_t end, int32_t slot)
     const voxel_job *from = job->from;
     const voxels *v = from->voxels;
     const double offset = from->corners ? 0.0 : 0.5;
-    const int shift[4] = {0, v->shift_y, v->shift_z, v->bits};
     for (size_t i = begin; i < end; i++) {
         int64_t at[3] = {0};
         for (int c = 0; c < from->dimension; c++) {
-            const int64_t cell =
-                v->low[c] + (int64_t)field(job->list->key[i], shift[c], shift[c + 1]);
+            const int64_t cell = ascc_axis_coordinate(
+                &v->axis[c], field(job->list->key[i], v->shift[c], v->shift[c + 1]));
             at[c] = (int64_t)rint(((double)cell + offset) * from->voxel + from->anchor[c]);
         }
         ascc_points_set(job->samples, i, at);

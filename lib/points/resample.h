@@ -9,7 +9,7 @@
 void ascc_centroid(const ascc_points *points, double center[3]);
 
 /* Centres of the voxels of edge `voxel` units, anchored at the world's origin, that hold a point.
- * errors: MEMORY, RANGE (more voxels than a key can number). */
+ * errors: MEMORY, RANGE. */
 ascc_status ascc_sample_centers(ascc_points *samples, const ascc_search_tools *tools,
                                 const ascc_points *points, int32_t dimension, double voxel);
 
@@ -20,7 +20,8 @@ ascc_status ascc_sample_corners(ascc_points *samples, const ascc_search_tools *t
                                 double hysteresis, const double anchor[3]);
 
 /* `count` of the points, each the farthest from those chosen before it, from the first on; ties go to
- * the earlier point; in the order of the points. cost: O(points * count). errors: MEMORY. */
+ * the earlier point; in the order of the points. Every point has a say in that, a far one first of all.
+ * cost: O(points * count). errors: MEMORY. */
 ascc_status ascc_sample_farthest(ascc_points *samples, const ascc_search_tools *tools,
                                  const ascc_points *points, size_t count);
 

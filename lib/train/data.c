@@ -6,7 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "near.h"
+#include "points/search.h"
 
 #define BINS 4096 /* of the histograms that percentiles come from */
 
@@ -79,22 +79,23 @@ static double percentile(const histogram *h, double share)
 static ascc_status measure_fluid(ascc_kept_sequence *s, const ascc_plan *plan, size_t frame,
                                  const double *x, const ascc_search_tools *tools, histogram *dense)
 {
-    ascc_near near;
+    ascc_search near;
     const double support = ascc_plan_support_radius(plan); /* 0: the last layer has no neighbours */
-    ascc_status status =
-        ascc_near_find(&near, tools, s->dimension, support > 0.0 ? support : 2.0 * plan->spacing, x,
-                       s->fluid_count, NULL, 0);
+    ascc_search_options within = {.dimension = s->dimension,
+                                  .radius = support > 0.0 ? support : 2.0 * plan->spacing,
+                                  .query = {x, s->fluid_count, "fluid row"}};
+    ascc_status status = ascc_search_run(&near, tools, &within);
     for (size_t i = 0; status == ASCC_OK && i < s->fluid_count; i++)
         s->near[frame * s->fluid_count + i] = (uint16_t)fmin(near.rows.count[i] - 1.0, 65535.0);
+    within.radius = 2.0 * plan->spacing;
     if (status == ASCC_OK)
-        status = ascc_near_find(&near, tools, s->dimension, 2.0 * plan->spacing, x, s->fluid_count,
-                                NULL, 0);
+        status = ascc_search_run(&near, tools, &within);
     for (size_t i = 0; status == ASCC_OK && i < s->fluid_count; i++) {
         double rho = 0.0;
         for (uint32_t k = 0; k < near.rows.count[i]; k++) {
             double e[3];
-            const double t =
-                1.0 - ascc_near_separation(&near, i, near.rows.neighbor[near.rows.start[i] + k], e);
+            const double t = 1.0 - ascc_search_separation(
+                                       &near, i, near.rows.neighbor[near.rows.start[i] + k], e);
             rho += t > 0.0 ? t * t * t : 0.0;
         }
         note(dense, rho);
@@ -107,15 +108,18 @@ static ascc_status measure_walls(const ascc_kept_sequence *s, const ascc_plan *p
                                  const ascc_search_tools *tools, histogram *depth)
 {
     const size_t d = (size_t)s->dimension;
-    ascc_near near;
-    const ascc_status status = ascc_near_find(&near, tools, s->dimension, plan->spacing, x,
-                                              s->fluid_count, wall, s->boundary_count);
+    ascc_search near;
+    const ascc_search_options within = {.dimension = s->dimension,
+                                        .radius = plan->spacing,
+                                        .query = {x, s->fluid_count, "fluid row"},
+                                        .source = {wall, s->boundary_count, "boundary row"}};
+    const ascc_status status = ascc_search_run(&near, tools, &within);
     for (size_t i = 0; status == ASCC_OK && i < s->fluid_count; i++) {
         double nearest = INFINITY, distance = 0.0;
         for (uint32_t k = 0; k < near.rows.count[i]; k++) {
             const size_t j = near.rows.neighbor[near.rows.start[i] + k];
             double e[3];
-            const double square = ascc_near_separation(&near, i, j, e);
+            const double square = ascc_search_separation(&near, i, j, e);
             if (square >= nearest)
                 continue;
             nearest = square;

@@ -3,7 +3,7 @@
 #include <math.h>
 #include <string.h>
 
-#include "near.h"
+#include "points/search.h"
 #include "rollout.h"
 
 static double distance_loss(const ascc_rollout_task *task, const ascc_plan *plan, const double *x,
@@ -38,13 +38,15 @@ static ascc_status density_loss(const ascc_rollout_task *task, const ascc_plan *
     const ascc_kept_sequence *s = task->sequence;
     const size_t d = (size_t)s->dimension, n = s->fluid_count;
     const double radius = 2.0 * plan->spacing, factor = task->density_weight / (double)n;
-    ascc_near near;
-    const ascc_status status = ascc_near_find(&near, tools, s->dimension, radius, x, n, NULL, 0);
+    ascc_search near;
+    const ascc_search_options within = {
+        .dimension = s->dimension, .radius = radius, .query = {x, n, "fluid row"}};
+    const ascc_status status = ascc_search_run(&near, tools, &within);
     for (size_t i = 0; status == ASCC_OK && i < n; i++) {
         const uint32_t *neighbor = near.rows.neighbor + near.rows.start[i];
         double rho = 0.0, e[3], square;
         for (uint32_t k = 0; k < near.rows.count[i]; k++) {
-            square = ascc_near_separation(&near, i, neighbor[k], e);
+            square = ascc_search_separation(&near, i, neighbor[k], e);
             const double t = fmax(1.0 - square, 0.0);
             rho += t * t * t;
         }
@@ -54,7 +56,7 @@ static ascc_status density_loss(const ascc_rollout_task *task, const ascc_plan *
         *loss += factor * excess * excess;
         const double by_rho = share * factor * 2.0 * excess / s->dense;
         for (uint32_t k = 0; gradient && k < near.rows.count[i]; k++) {
-            square = ascc_near_separation(&near, i, neighbor[k], e);
+            square = ascc_search_separation(&near, i, neighbor[k], e);
             const double t = fmax(1.0 - square, 0.0), by = by_rho * -6.0 * t * t / radius;
             for (size_t c = 0; c < d; c++) {
                 gradient[neighbor[k] * d + c] += by * e[c];
@@ -72,15 +74,18 @@ static ascc_status wall_loss(const ascc_rollout_task *task, const ascc_plan *pla
     const ascc_kept_sequence *s = task->sequence;
     const size_t d = (size_t)s->dimension, n = s->fluid_count;
     const double factor = task->wall_weight / (double)n, h = plan->spacing;
-    ascc_near near;
-    const ascc_status status =
-        ascc_near_find(&near, tools, s->dimension, 4.0 * h, x, n, wall, s->boundary_count);
+    ascc_search near;
+    const ascc_search_options within = {.dimension = s->dimension,
+                                        .radius = 4.0 * h,
+                                        .query = {x, n, "fluid row"},
+                                        .source = {wall, s->boundary_count, "boundary row"}};
+    const ascc_status status = ascc_search_run(&near, tools, &within);
     for (size_t i = 0; status == ASCC_OK && i < n; i++) {
         const uint32_t *neighbor = near.rows.neighbor + near.rows.start[i];
         double nearest = INFINITY, e[3], square, depth = 0.0;
         size_t at = 0;
         for (uint32_t k = 0; k < near.rows.count[i]; k++) {
-            square = ascc_near_separation(&near, i, neighbor[k], e);
+            square = ascc_search_separation(&near, i, neighbor[k], e);
             if (square < nearest) {
                 nearest = square;
                 at = neighbor[k];
