@@ -27,17 +27,20 @@ ascc_geometry ascc_geometry_of(const ascc_network_run *run, const ascc_rows *row
 
 /* Features of a row's neighbours, their motion less the row's own. */
 static void relative_features(const ascc_network_run *run, const ascc_term *term, size_t row,
-                              const uint32_t *neighbor, size_t count, float *to)
+                              const uint32_t *neighbor, size_t count, float *restrict to)
 {
     const ascc_plan *plan = run->plan;
     const size_t a = ascc_padded(term->inputs), own_a = ascc_padded(plan->fluid_channels);
-    const int32_t from = ascc_plan_motion(plan, term->source);
+    const int32_t motion = ascc_plan_motion(plan, term->source);
     const float *own = run->value[0].raw + row * own_a + ascc_plan_motion(plan, 0);
     const float *feature = run->value[term->source].raw;
     for (size_t k = 0; k < count; k++, to += a) {
-        memcpy(to, feature + neighbor[k] * a, a * sizeof *to);
+        const float *restrict from = feature + neighbor[k] * a;
+        for (size_t c = 0; c < a; c += 8) /* rows are whole vectors */
+            for (size_t n = 0; n < 8; n++)
+                to[c + n] = from[c + n];
         for (int32_t c = 0; c < plan->dimension; c++)
-            to[from + c] -= own[c];
+            to[motion + c] -= own[c];
     }
 }
 

@@ -30,15 +30,17 @@ ascc_scratch_sizes ascc_network_sizes(const ascc_network_run *run, const ascc_la
 /* Stores one row of a value as its readers want it, filled up with zeros. */
 static void store_row(const ascc_value *value, size_t row, const float *from, int32_t channels)
 {
-    const size_t padded = ascc_padded(channels);
-    float *raw = value->raw ? value->raw + row * padded : NULL;
-    float *rectified = value->rectified ? value->rectified + row * padded : NULL;
-    for (size_t c = 0; c < padded; c++) {
-        const float x = c < (size_t)channels ? from[c] : 0.0f;
-        if (raw)
-            raw[c] = x;
-        if (rectified)
-            rectified[c] = x < 0.0f ? 0.0f : x;
+    const size_t padded = ascc_padded(channels), count = (size_t)channels;
+    if (value->raw) {
+        float *to = value->raw + row * padded;
+        memcpy(to, from, count * sizeof *to);
+        memset(to + count, 0, (padded - count) * sizeof *to);
+    }
+    if (value->rectified) {
+        float *to = value->rectified + row * padded;
+        for (size_t c = 0; c < count; c++)
+            to[c] = from[c] < 0.0f ? 0.0f : from[c];
+        memset(to + count, 0, (padded - count) * sizeof *to);
     }
 }
 

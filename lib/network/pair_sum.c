@@ -92,15 +92,15 @@ void ascc_pair_sum_add_walls(ascc_pair_sum *sum, size_t i, const ascc_pair_batch
                              ascc_pair_impulses impulse)
 {
     const size_t d = (size_t)sum->run->plan->dimension;
-    int64_t quanta[ASCC_PAIR_BATCH];
+    int64_t quanta[ASCC_PAIR_BATCH], *wall[ASCC_PAIR_BATCH];
     bool good = true;
+    for (size_t k = 0; k < batch->count; k++)
+        wall[k] = sum->wall + wall_of(sum->run->hierarchy, batch->neighbor[k]) * d;
     for (size_t c = 0; c < d && good; c++) {
         good = ascc_round_quanta(impulse[c], batch->count, quanta);
-        for (size_t k = 0; k < batch->count && good; k++) {
-            const size_t wall = wall_of(sum->run->hierarchy, batch->neighbor[k]);
+        for (size_t k = 0; k < batch->count && good; k++)
             good = add_impulse(&sum->sum[i * sum->stride + c], quanta[k]) &&
-                   push_wall(&sum->wall[wall * d + c], -quanta[k]);
-        }
+                   push_wall(&wall[k][c], -quanta[k]);
     }
     if (!good)
         ascc_pair_sum_note_bad(sum, i);
