@@ -1,4 +1,5 @@
-/* What every file uses: assertions, checked sizes, and the line that says what went wrong.
+/* What every file uses: assertions, checked sizes, the floating point environment, and the line that
+ * says what went wrong.
  * SPDX-License-Identifier: MIT */
 #ifndef ASCC_COMMON_H
 #define ASCC_COMMON_H
@@ -10,6 +11,8 @@
 #include <stdint.h>
 
 #include <ascc/ascc.h>
+
+#include "float_env.h"
 
 #define ASCC_MESSAGE_CAPACITY 256
 
