@@ -5,6 +5,7 @@
 #define ASCC_COMMON_H
 
 #include <assert.h>
+#include <float.h>
 #include <stdarg.h>
 #include <stdbool.h>
 #include <stddef.h>
@@ -13,6 +14,15 @@
 #include <ascc/ascc.h>
 
 #include "float_env.h"
+
+/* A build that keeps more digits between operations, or reorders them, would compute other bits and
+ * not know it. meson.build sets the flags that cure this where there are some. */
+#if FLT_EVAL_METHOD != 0
+#error "float and double must be computed in their own precision (32-bit x86: -msse2 -mfpmath=sse)"
+#endif
+#if defined(__FAST_MATH__) || (defined(__FINITE_MATH_ONLY__) && __FINITE_MATH_ONLY__ > 0)
+#error "libascc cannot be built with -ffast-math: results would not be the same everywhere"
+#endif
 
 #define ASCC_MESSAGE_CAPACITY 256
 
