@@ -31,7 +31,9 @@ typedef struct ascc_message {
     char text[ASCC_MESSAGE_CAPACITY];
 } ascc_message;
 
-#if defined(__GNUC__)
+#if defined(__MINGW32__) && defined(__GNUC__) && !defined(__clang__)
+#define ASCC_PRINTF(text, first) __attribute__((format(gnu_printf, text, first)))
+#elif defined(__GNUC__)
 #define ASCC_PRINTF(text, first) __attribute__((format(printf, text, first)))
 #else
 #define ASCC_PRINTF(text, first)
