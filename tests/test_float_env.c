@@ -78,7 +78,7 @@ typedef struct host {
 static void *call_task(void *argument)
 {
     const struct host_call *const call = argument;
-    const int mode = atomic_fetch_add(&call->host->next_mode, 1) % (int)COUNT_OF(float_modes);
+    const int mode = atomic_fetch_add(&call->host->next_mode, 1) % (int)FLOAT_MODE_COUNT;
     float_state_set(float_modes[mode].state);
     call->host->task(call->host->work, call->index);
     if (float_state() != float_modes[mode].state)
@@ -182,7 +182,7 @@ static void the_hosts_environment_does_not_change_a_bit(void **state)
     for (size_t n = 0; n < COUNT_OF(counts); n++) {
         const uint64_t right = run_scene(s, counts[n], &settings[0], FLOAT_DEFAULT, FLOAT_DEFAULT);
         for (size_t k = 0; k < COUNT_OF(settings); k++)
-            for (size_t m = 0; m < COUNT_OF(float_modes); m++) {
+            for (size_t m = 0; m < FLOAT_MODE_COUNT; m++) {
                 const uint64_t mode = float_modes[m].state;
                 const uint64_t both = run_scene(s, counts[n], &settings[k], mode, mode);
                 const uint64_t made = run_scene(s, counts[n], &settings[k], mode, FLOAT_DEFAULT);
@@ -375,7 +375,7 @@ static int count_not_called(void)
 static void every_call_leaves_the_environment_as_it_was(void **state)
 {
     const scene *const s = *state;
-    for (size_t m = 0; m < COUNT_OF(float_modes); m++) {
+    for (size_t m = 0; m < FLOAT_MODE_COUNT; m++) {
         present = &float_modes[m];
         called[0] = '\0';
         const ascc_context_options context_options = {.size = sizeof context_options,
@@ -434,7 +434,7 @@ static void a_scope_is_the_default_environment_and_ends_at_any_return(void **sta
     const volatile double one = 1.0, zero = 0.0, seven = 7.0;
     (void)divide(&one, &zero, &inside);
     assert_true(float_state() == FLOAT_DEFAULT);
-    for (size_t m = 0; m < COUNT_OF(float_modes); m++) {
+    for (size_t m = 0; m < FLOAT_MODE_COUNT; m++) {
         float_state_set(float_modes[m].state);
         (void)divide(&one, &zero, &inside);
         (void)divide(&one, &seven, &inside);

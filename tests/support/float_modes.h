@@ -112,4 +112,6 @@ static void float_state_set(uint64_t state)
 
 #endif
 
+#define FLOAT_MODE_COUNT (sizeof float_modes / sizeof *float_modes)
+
 #endif
