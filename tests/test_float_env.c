@@ -454,5 +454,5 @@ int main(void)
         cmocka_unit_test(the_hosts_environment_does_not_change_a_bit),
         cmocka_unit_test(every_call_leaves_the_environment_as_it_was),
     };
-    return cmocka_run_group_tests(tests, make_scene, free_scene);
+    return cmocka_run_group_tests_name("float_env", tests, make_scene, free_scene);
 }
