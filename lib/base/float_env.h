@@ -8,8 +8,9 @@
  * pending exceptions as they were, and none of ours. Callbacks run in our environment.
  *
  * The compiler does not know that arithmetic depends on the environment. It may not carry memory
- * accesses across the two calls, though, and no public function takes or returns a floating point
- * number by value: so operands are read after the one, and results written before the other.
+ * accesses across the two calls, though, and public functions take and give numbers through memory
+ * (one argument apart, which meets numbers from memory at once): so operands are read after the one
+ * call, and results written before the other.
  */
 #ifndef ASCC_FLOAT_ENV_H
 #define ASCC_FLOAT_ENV_H
