@@ -248,7 +248,7 @@ done
 runner=env
 "$build/empty" 2>/dev/null || runner=qemu-i386-static
 if [ -n "$compiler" ]; then
-    machine $name "$compiler" "3 0" "fused float_env" $runner
+    machine $name "$compiler" 3 "fused float_env" $runner
 else
     skip "state hashes: 32-bit x86" "needs gcc-i686-linux-gnu, or a gcc or clang that has -m32"
 fi
