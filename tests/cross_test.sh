@@ -253,8 +253,6 @@ else
     skip "state hashes: 32-bit x86" "needs gcc-i686-linux-gnu, or a gcc or clang that has -m32"
 fi
 
-also=
-
 # 64-bit Windows. Wine keeps its files in the build folder. (Its C library's fmaf, with which test_fused
 # compares, rounds twice; ours does not.)
 machine_flags="-D__USE_MINGW_ANSI_STDIO=1 -static"
