@@ -26,7 +26,7 @@ code() {
     done
 }
 
-libc='assert|errno|fcntl|float|immintrin|inttypes|limits|malloc|math|pthread|stdalign|stdarg|stdatomic|stdbool|stddef|stdint|stdio|stdlib|string|sys/stat|time|unistd|windows|arm_neon|sched'
+libc='assert|errno|fcntl|fenv|float|immintrin|inttypes|limits|malloc|math|pthread|stdalign|stdarg|stdatomic|stdbool|stddef|stdint|stdio|stdlib|string|sys/stat|time|unistd|windows|arm_neon|sched'
 kernels=$(cd lib/kernels && echo *.h | sed 's/\.h//g; s/ /|/g')
 sources=$(find lib -name '*.c' -o -name '*.h' | sort)
 
@@ -53,6 +53,16 @@ check 'programs include only the public header of lib' "$(
 check 'every linkable symbol of lib starts with ascc_' "$(
     nm -gAP "$build"/lib/libascc-*.a 2>/dev/null |
         awk '$3 ~ /^[TDBRCVW]$/ && $2 !~ /^(ascc_|__(asan|ubsan|odr_asan|gcov|llvm)|_GLOBAL__)/')"
+# Public functions that move no floating point number but by memcpy, if at all.
+plain='version|status_text|context_.*|[a-z]+_(destroy|message)|model_(save|bytes)|trainer_(iteration|parameter_count)'
+plain="$plain|particles_(reserve|remove|clear|count|capacity|dimension|find|snapshot_size|momentum_quantum)"
+plain="$plain|particles_(total_momentum|get_(ids|bodies|momentum))"
+check 'every public function with floating point begins with ASCC_FLOAT_SCOPE' "$(
+    awk '/^[a-z].*[ *]ascc_[a-z_]+\(/ && !/;/ { sub(/\(.*/, ""); sub(/.*[ *]/, ""); name = $0 }
+        body { if (/ASCC_FLOAT_SCOPE;/) print name }
+        { body = /^\{/ }' $sources >"$build/scopes.txt"
+    sed -n 's/^ASCC_API.*[ *]\(ascc_[a-z_]*\)(.*/\1/p' include/ascc/ascc.h include/ascc/train.h |
+        grep -vE "^ascc_($plain)\$" | grep -vxFf "$build/scopes.txt")"
 check 'the shared library exports what tests/exports.txt lists' "$(
     nm -D --defined-only "$build/lib/libascc.so" | awk '{ print $3 }' | LC_ALL=C sort |
         diff - tests/exports.txt)"

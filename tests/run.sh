@@ -5,6 +5,7 @@ set -u
 cd "$(dirname "$0")/.." || exit 1
 . tests/setup.sh
 setup || exit 1
+setup_cross
 
 passed=0
 failed=0

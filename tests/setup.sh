@@ -29,3 +29,25 @@ setup() {
     echo "jansson with their headers (Debian's names: $packages) and try again." >&2
     return 1
 }
+
+# COMMAND PACKAGES: installs them if the command is missing and nothing has to go for them (Debian's
+# gcc-multilib, for one, excludes the cross compilers).
+setup_optional() {
+    command -v "$1" >/dev/null 2>&1 && return 0
+    shift
+    [ -n "${setup_updated:-}" ] || apt-get update -q >/dev/null 2>&1
+    setup_updated=yes
+    DEBIAN_FRONTEND=noninteractive apt-get install -q -y --no-remove --no-install-recommends "$@" \
+        >/dev/null 2>&1 && echo "Installed: $*"
+}
+
+# What tests/cross_test.sh needs for some machines, and is small; for root only. Where they are it also
+# uses gcc-mingw-w64-x86-64-posix with wine, and emscripten with nodejs.
+setup_cross() {
+    [ "$(id -u)" -eq 0 ] && command -v apt-get >/dev/null 2>&1 || return 0
+    setup_optional qemu-aarch64-static qemu-user-static
+    setup_optional aarch64-linux-gnu-gcc gcc-aarch64-linux-gnu libc6-dev-arm64-cross
+    setup_optional s390x-linux-gnu-gcc gcc-s390x-linux-gnu libc6-dev-s390x-cross
+    setup_optional i686-linux-gnu-gcc gcc-i686-linux-gnu libc6-dev-i386-cross
+    return 0
+}

@@ -5,6 +5,7 @@
 #include <math.h>
 #include <unistd.h>
 
+#include "support/float_modes.h"
 #include "support/model_builder.h"
 #include "support/oracle.h"
 #include "support/tools.h"
@@ -586,6 +587,50 @@ static void creation_without_memory_says_so(void **state)
     free(bytes);
 }
 
+/* In one of the host's floating point environments; false: it failed, or left another one. */
+#define IN_MODE(mode, call)                                                                        \
+    (float_state_set(mode), kept = (call) == ASCC_OK && float_state() == (mode),                   \
+     float_state_set(FLOAT_DEFAULT), kept)
+
+static void the_hosts_floating_point_environment_changes_no_weight(void **state)
+{
+    (void)state;
+    char path[] = "/tmp/ascc-train-XXXXXX";
+    const int file = mkstemp(path);
+    assert_true(file >= 0);
+    const model_random random = everything(25, 2);
+    motion *m = make_motion(8, 2);
+    size_t size;
+    unsigned char *bytes = model_builder_random(&random, &size);
+    const ascc_trainer_options one = augmented(1), two = augmented(2);
+    ascc_trainer *right = open_trainer(&one, &random, m);
+    iterate(right, 2);
+    float *values = parameters_of(right);
+    for (size_t i = 0; i < 2 * FLOAT_MODE_COUNT; i++) {
+        const uint64_t mode = float_modes[i / 2].state;
+        ascc_trainer *t;
+        ascc_training_report report = {.size = sizeof report};
+        double loss;
+        bool kept;
+        assert_true(IN_MODE(mode, ascc_trainer_create(i % 2 ? &two : &one, bytes, size, &t)));
+        assert_true(IN_MODE(mode, ascc_trainer_add_sequence(t, &m->sequence)));
+        assert_true(IN_MODE(mode, ascc_trainer_gradient(t, 0, 1, 0, 1, &loss, NULL)));
+        assert_true(IN_MODE(mode, ascc_trainer_iterate(t, &report)));
+        assert_true(IN_MODE(mode, ascc_trainer_save(t, path)));
+        assert_true(IN_MODE(mode, ascc_trainer_load(t, path)));
+        assert_true(IN_MODE(mode, ascc_trainer_iterate(t, &report)));
+        assert_same_models(t, right);
+        assert_true(IN_MODE(mode, ascc_trainer_get_parameters(t, values)));
+        assert_true(IN_MODE(mode, ascc_trainer_set_parameters(t, values)));
+        ascc_trainer_destroy(&t);
+    }
+    remove(path);
+    free(values);
+    free(bytes);
+    ascc_trainer_destroy(&right);
+    free(m);
+}
+
 static void going_on_from_a_saved_state_gives_the_same_bits(void **state)
 {
     (void)state;
@@ -936,6 +981,7 @@ int main(void)
         cmocka_unit_test(gradients_of_penalties_are_right),
         cmocka_unit_test(same_seed_gives_the_same_weights_for_any_threads),
         cmocka_unit_test(creation_without_memory_says_so),
+        cmocka_unit_test(the_hosts_floating_point_environment_changes_no_weight),
         cmocka_unit_test(going_on_from_a_saved_state_gives_the_same_bits),
         cmocka_unit_test(a_sequence_with_a_nan_is_refused_by_name),
         cmocka_unit_test(a_sequence_of_another_time_step_or_too_short_is_refused),

@@ -18,6 +18,11 @@
  *              of the handle: any number of threads may read one at once, and fail at it.
  *   units      lengths are in the host's unit, seconds, kilograms. The model works in metres; the
  *              step's option `length_unit` says how many metres the host's unit is.
+ *   floating   every call computes in C's default environment (rounding to nearest, nothing traps,
+ *   point      nothing flushed to zero) whatever the calling thread and the job system's threads
+ *              have set, and leaves each thread as it was: modes and pending exceptions stay, none
+ *              of the library's own are added. A callback may find that default environment in place
+ *              of its thread's; one that needs another sets it and puts it back.
  *   the library never prints, aborts, exits or keeps global state.
  */
 #ifndef ASCC_ASCC_H

@@ -1,15 +1,28 @@
-/* What every file uses: assertions, checked sizes, and the line that says what went wrong.
+/* What every file uses: assertions, checked sizes, the floating point environment, and the line that
+ * says what went wrong.
  * SPDX-License-Identifier: MIT */
 #ifndef ASCC_COMMON_H
 #define ASCC_COMMON_H
 
 #include <assert.h>
+#include <float.h>
 #include <stdarg.h>
 #include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
 
 #include <ascc/ascc.h>
+
+#include "float_env.h"
+
+/* A build that keeps more digits between operations, or reorders them, would compute other bits and
+ * not know it. meson.build sets the flags that cure this where there are some. */
+#if FLT_EVAL_METHOD != 0
+#error "float and double must be computed in their own precision (32-bit x86: -msse2 -mfpmath=sse)"
+#endif
+#if defined(__FAST_MATH__) || (defined(__FINITE_MATH_ONLY__) && __FINITE_MATH_ONLY__ > 0)
+#error "libascc cannot be built with -ffast-math: results would not be the same everywhere"
+#endif
 
 #define ASCC_MESSAGE_CAPACITY 256
 
@@ -18,7 +31,9 @@ typedef struct ascc_message {
     char text[ASCC_MESSAGE_CAPACITY];
 } ascc_message;
 
-#if defined(__GNUC__)
+#if defined(__MINGW32__) && defined(__GNUC__) && !defined(__clang__)
+#define ASCC_PRINTF(text, first) __attribute__((format(gnu_printf, text, first)))
+#elif defined(__GNUC__)
 #define ASCC_PRINTF(text, first) __attribute__((format(printf, text, first)))
 #else
 #define ASCC_PRINTF(text, first)

@@ -72,6 +72,7 @@ static void finish_block(ascc_workers *workers, uint32_t blocks)
 /* Does blocks until none is left. */
 static void take_blocks(ascc_workers *workers, int32_t slot)
 {
+    ASCC_FLOAT_SCOPE; /* the thread is the host's, or as the host's was when it started ours */
     uint64_t ticket = atomic_load_explicit(&workers->ticket, memory_order_acquire);
     while (blocks_left(ticket) != 0) {
         const ascc_range_function function =

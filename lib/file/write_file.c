@@ -167,7 +167,8 @@ static bool write_piece(int file, const ascc_bytes *piece)
     const unsigned char *at = piece->data;
     size_t left = piece->size;
     while (left > 0) {
-        const ssize_t written = write(file, at, ascc_min_size(left, MAX_WRITE));
+        const unsigned now = (unsigned)ascc_min_size(left, MAX_WRITE); /* Windows takes no size_t */
+        const ssize_t written = write(file, at, now);
         if (written < 0 && errno == EINTR)
             continue;
         if (written <= 0) {

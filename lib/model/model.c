@@ -157,6 +157,7 @@ static ascc_status begin_load(ascc_context *context, const void *source, ascc_mo
 ascc_status ascc_model_load_memory(ascc_context *context, const void *data, size_t size,
                                    ascc_model **model)
 {
+    ASCC_FLOAT_SCOPE;
     ascc_message message = {""};
     const ascc_status status = begin_load(context, data, model);
     if (status != ASCC_OK)
@@ -191,6 +192,7 @@ static ascc_status read_file(const ascc_allocator *allocator, FILE *file, unsign
 
 ascc_status ascc_model_load(ascc_context *context, const char *path, ascc_model **model)
 {
+    ASCC_FLOAT_SCOPE;
     ascc_message message = {""};
     unsigned char *bytes = NULL;
     size_t size = 0;
@@ -238,6 +240,7 @@ const void *ascc_model_bytes(const ascc_model *model, size_t *size)
 
 ascc_status ascc_model_get_info(const ascc_model *model, ascc_model_info *info)
 {
+    ASCC_FLOAT_SCOPE;
     if (!alive(model) || !info)
         return ASCC_ERROR_ARGUMENT;
     const ascc_plan *plan = &model->plan;
@@ -273,6 +276,7 @@ ascc_status ascc_model_get_info(const ascc_model *model, ascc_model_info *info)
 ascc_status ascc_model_particles_options(const ascc_model *model, double length_unit,
                                          ascc_particles_options *options)
 {
+    ASCC_FLOAT_SCOPE;
     if (!alive(model) || !options || !(length_unit >= 0.0 && isfinite(length_unit)))
         return ASCC_ERROR_ARGUMENT;
     const ascc_plan *plan = &model->plan;

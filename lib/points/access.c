@@ -102,6 +102,7 @@ static ascc_status set_field(ascc_particles *particles, ascc_field_index field, 
 ascc_status ascc_particles_set(ascc_particles *particles, ascc_kind kind, ascc_field field,
                                size_t first, size_t count, const ascc_const_array *values)
 {
+    ASCC_FLOAT_SCOPE;
     if (!ascc_particles_is_set(particles))
         return ASCC_ERROR_ARGUMENT;
     ascc_message message;
@@ -132,6 +133,7 @@ static double field_value(const ascc_particles *particles, ascc_field_index fiel
 ascc_status ascc_particles_get(const ascc_particles *particles, ascc_kind kind, ascc_field field,
                                size_t first, size_t count, const ascc_array *values)
 {
+    ASCC_FLOAT_SCOPE;
     if (!ascc_particles_is_set(particles))
         return ASCC_ERROR_ARGUMENT;
     ascc_message message;

@@ -97,6 +97,7 @@ static ascc_status measure_density(const ascc_particles *p, ascc_arena *arena, a
 
 ascc_status ascc_particles_measure(ascc_particles *particles, ascc_measures *measures)
 {
+    ASCC_FLOAT_SCOPE;
     if (!ascc_particles_is_set(particles))
         return ASCC_ERROR_ARGUMENT;
     ascc_measures m = {0};

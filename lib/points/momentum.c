@@ -172,6 +172,7 @@ static ascc_status check_body_and_point(const ascc_particles *particles, int32_t
 ascc_status ascc_particles_body_impulse(const ascc_particles *particles, int32_t body,
                                         const double point[3], int64_t impulse[3], double torque[3])
 {
+    ASCC_FLOAT_SCOPE;
     static const double origin[3] = {0};
     if (!ascc_particles_is_set(particles))
         return ASCC_ERROR_ARGUMENT;

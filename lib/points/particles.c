@@ -136,6 +136,7 @@ static ascc_status make(ascc_context *context, const ascc_particles_options *opt
 ascc_status ascc_particles_create(ascc_context *context, const ascc_particles_options *options,
                                   ascc_particles **particles)
 {
+    ASCC_FLOAT_SCOPE;
     if (particles == NULL)
         return ASCC_ERROR_ARGUMENT;
     *particles = NULL;
@@ -250,6 +251,7 @@ ascc_status ascc_particles_add_fluid(ascc_particles *particles, size_t count,
                                      const ascc_const_array *velocity, const ascc_const_array *mass,
                                      uint64_t *ids)
 {
+    ASCC_FLOAT_SCOPE;
     if (!ascc_particles_is_set(particles))
         return ASCC_ERROR_ARGUMENT;
     ascc_status status = check_count(particles, ASCC_FLUID, count);
@@ -278,6 +280,7 @@ ascc_status ascc_particles_add_boundary(ascc_particles *particles, size_t count,
                                         const ascc_const_array *position,
                                         const ascc_const_array *normal, int32_t body, uint64_t *ids)
 {
+    ASCC_FLOAT_SCOPE;
     if (!ascc_particles_is_set(particles))
         return ASCC_ERROR_ARGUMENT;
     ascc_status status = check_count(particles, ASCC_BOUNDARY, count);
@@ -318,6 +321,7 @@ ascc_status ascc_particles_add_boundary(ascc_particles *particles, size_t count,
 
 ascc_status ascc_particles_resize_fluid(ascc_particles *particles, size_t count)
 {
+    ASCC_FLOAT_SCOPE;
     if (!ascc_particles_is_set(particles))
         return ASCC_ERROR_ARGUMENT;
     if (count <= particles->fluid_count) {

@@ -113,6 +113,7 @@ static unsigned char *put(unsigned char *into, uint64_t word)
 
 ascc_status ascc_particles_snapshot(const ascc_particles *particles, void *memory, size_t capacity)
 {
+    ASCC_FLOAT_SCOPE;
     if (!ascc_particles_is_set(particles))
         return ASCC_ERROR_ARGUMENT;
     const size_t size = ascc_particles_snapshot_size(particles);
@@ -281,6 +282,7 @@ static void become(ascc_particles *particles, const snapshot *from)
 
 ascc_status ascc_particles_restore(ascc_particles *particles, const void *memory, size_t size)
 {
+    ASCC_FLOAT_SCOPE;
     if (!ascc_particles_is_set(particles))
         return ASCC_ERROR_ARGUMENT;
     if (memory == NULL)
@@ -342,6 +344,7 @@ static uint64_t sum_rows(const ascc_particles *particles, ascc_kind kind)
 
 uint64_t ascc_particles_hash(const ascc_particles *particles)
 {
+    ASCC_FLOAT_SCOPE;
     if (!ascc_particles_is_set(particles))
         return 0;
     uint64_t hash = mix(0, ascc_particles_width(particles));

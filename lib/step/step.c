@@ -85,6 +85,7 @@ static ascc_status fill_step(ascc_step *step, const ascc_step_options *o, ascc_m
 ascc_status ascc_step_create(ascc_context *context, const ascc_model *model,
                              const ascc_step_options *options, ascc_step **step)
 {
+    ASCC_FLOAT_SCOPE;
     if (step)
         *step = NULL;
     if (!context || context->magic != ASCC_CONTEXT_MAGIC || !step)
@@ -139,6 +140,7 @@ void ascc_step_destroy(ascc_step **step)
 
 size_t ascc_step_estimate(const ascc_step *step, size_t fluid, size_t boundary)
 {
+    ASCC_FLOAT_SCOPE;
     if (!step || step->magic != ASCC_STEP_MAGIC)
         return 0;
     return ascc_estimate_scratch(&step->network, fluid, boundary,
@@ -147,6 +149,7 @@ size_t ascc_step_estimate(const ascc_step *step, size_t fluid, size_t boundary)
 
 ascc_status ascc_step_reserve(ascc_step *step, size_t fluid, size_t boundary)
 {
+    ASCC_FLOAT_SCOPE;
     if (!step || step->magic != ASCC_STEP_MAGIC)
         return ASCC_ERROR_ARGUMENT;
     const size_t size = ascc_step_estimate(step, fluid, boundary);
@@ -344,6 +347,7 @@ static ascc_status run_once(ascc_step *step, ascc_particles *p, const ascc_motio
 ascc_status ascc_step_run(ascc_step *step, ascc_particles *particles, const ascc_forces *forces,
                           int32_t count)
 {
+    ASCC_FLOAT_SCOPE;
     if (!step || step->magic != ASCC_STEP_MAGIC)
         return ASCC_ERROR_ARGUMENT;
     step->statistics = (ascc_step_statistics){.level_count = step->model->plan.level_count,
@@ -374,6 +378,7 @@ ascc_status ascc_step_run(ascc_step *step, ascc_particles *particles, const ascc
 
 ascc_status ascc_step_get_statistics(const ascc_step *step, ascc_step_statistics *statistics)
 {
+    ASCC_FLOAT_SCOPE;
     if (!step || step->magic != ASCC_STEP_MAGIC || !statistics)
         return ASCC_ERROR_ARGUMENT;
     return ascc_write_struct(statistics, &step->statistics, sizeof step->statistics,

@@ -26,6 +26,7 @@ static void fill_model(const ascc_trainer *t, const float *weights, unsigned cha
 
 const void *ascc_trainer_model(ascc_trainer *t, int32_t averaged, size_t *size)
 {
+    ASCC_FLOAT_SCOPE;
     if (!ascc_trainer_alive(t) || !size)
         return NULL;
     const bool average = averaged && t->options.average > 0.0;
@@ -48,6 +49,7 @@ static uint64_t network_hash(const ascc_trainer *t)
 
 ascc_status ascc_trainer_save(const ascc_trainer *trainer, const char *path)
 {
+    ASCC_FLOAT_SCOPE;
     if (!ascc_trainer_alive(trainer) || !path)
         return ASCC_ERROR_ARGUMENT;
     ascc_trainer *t = (ascc_trainer *)trainer; /* a failure's message is the one change */
@@ -184,6 +186,7 @@ static ascc_status read_state(ascc_trainer *t, const char *path, ascc_safetensor
 
 ascc_status ascc_trainer_load(ascc_trainer *t, const char *path)
 {
+    ASCC_FLOAT_SCOPE;
     if (!ascc_trainer_alive(t) || !path)
         return ASCC_ERROR_ARGUMENT;
     FILE *stream = fopen(path, "rb");

@@ -196,6 +196,7 @@ static void tell(const ascc_trainer_options *options, const char *why)
 ascc_status ascc_trainer_create(const ascc_trainer_options *options, const void *model,
                                 size_t model_size, ascc_trainer **trainer)
 {
+    ASCC_FLOAT_SCOPE;
     if (trainer)
         *trainer = NULL;
     if (!options || !model || !trainer)
@@ -284,6 +285,7 @@ size_t ascc_trainer_parameter_count(const ascc_trainer *t)
 
 ascc_status ascc_trainer_get_parameters(const ascc_trainer *t, float *values)
 {
+    ASCC_FLOAT_SCOPE;
     if (!ascc_trainer_alive(t) || !values)
         return ASCC_ERROR_ARGUMENT;
     memcpy(values, t->weights, t->parameter_count * sizeof *values);
@@ -301,6 +303,7 @@ void ascc_trainer_apply(ascc_trainer *t)
 
 ascc_status ascc_trainer_set_parameters(ascc_trainer *t, const float *values)
 {
+    ASCC_FLOAT_SCOPE;
     if (!ascc_trainer_alive(t) || !values)
         return ASCC_ERROR_ARGUMENT;
     for (size_t i = 0; i < t->tensor_count; i++)
@@ -356,6 +359,7 @@ static ascc_status rollout_failure(ascc_trainer *t, const ascc_rollout_task *tas
 ascc_status ascc_trainer_gradient(ascc_trainer *t, size_t sequence, size_t frame, int32_t presteps,
                                   int32_t horizon, double *loss, float *gradient)
 {
+    ASCC_FLOAT_SCOPE;
     if (!ascc_trainer_alive(t) || !loss)
         return ASCC_ERROR_ARGUMENT;
     if (sequence >= t->sequence_count || frame < 1 || presteps < 0 || horizon < 1 ||
@@ -388,6 +392,7 @@ ascc_status ascc_trainer_gradient(ascc_trainer *t, size_t sequence, size_t frame
 
 ascc_status ascc_trainer_add_sequence(ascc_trainer *t, const ascc_training_sequence *sequence)
 {
+    ASCC_FLOAT_SCOPE;
     if (!ascc_trainer_alive(t) || !sequence)
         return ASCC_ERROR_ARGUMENT;
     ascc_training_sequence given;
@@ -599,6 +604,7 @@ static ascc_status count_deaf(ascc_trainer *t, const ascc_training_report *repor
 
 ascc_status ascc_trainer_iterate(ascc_trainer *t, ascc_training_report *report)
 {
+    ASCC_FLOAT_SCOPE;
     ascc_training_report own = {0};
     if (!ascc_trainer_alive(t))
         return ASCC_ERROR_ARGUMENT;

@@ -1,10 +1,11 @@
-/* As much of cmocka as test_kernels.c and test_fused.c need, for machines without it: the first failure
+/* As much of cmocka as the tests of tests/cross_test.sh need, for machines without it: the first failure
  * of a test ends the program. Prints TAP. SPDX-License-Identifier: MIT */
 #ifndef BARE_CMOCKA_H
 #define BARE_CMOCKA_H
 
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 
 struct CMUnitTest {
     const char *name;
@@ -29,17 +30,26 @@ struct CMUnitTest {
     } while (0)
 #define assert_non_null(pointer) assert_true((pointer) != NULL)
 #define assert_int_equal(a, b) assert_true((a) == (b))
+#define assert_int_not_equal(a, b) assert_true((a) != (b))
+#define assert_memory_equal(a, b, size) assert_true(memcmp(a, b, size) == 0)
+#define print_message(...) printf(__VA_ARGS__)
 
 #define cmocka_run_group_tests_name(group, tests, setup, teardown)                                 \
-    bare_run(group, tests, sizeof(tests) / sizeof *(tests))
+    bare_run(group, tests, sizeof(tests) / sizeof *(tests), setup, teardown)
+#define cmocka_run_group_tests(tests, setup, teardown)                                             \
+    cmocka_run_group_tests_name(#tests, tests, setup, teardown)
 
-static inline int bare_run(const char *group, const struct CMUnitTest *tests, size_t count)
+static inline int bare_run(const char *group, const struct CMUnitTest *tests, size_t count,
+                           int (*setup)(void **), int (*teardown)(void **))
 {
+    void *state = NULL;
+    if (setup != NULL && setup(&state) != 0)
+        return 1;
     for (size_t i = 0; i < count; i++) {
-        tests[i].run(NULL);
+        tests[i].run(&state);
         printf("ok %zu - %s: %s\n", i + 1, group, tests[i].name);
     }
-    return 0;
+    return teardown != NULL ? teardown(&state) : 0;
 }
 
 #endif
