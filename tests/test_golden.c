@@ -124,6 +124,7 @@ static small_case small_open(golden *g, const char *name)
     s.term = (ascc_term){.operation = &ascc_op_grid,
                          .source = 1,
                          .inputs = (int32_t)whole[3],
+                         .gathered = (int32_t)whole[3],
                          .outputs = (int32_t)whole[4],
                          .filter = filter};
     s.plan.dimension = 3;

@@ -226,6 +226,32 @@ static void moments_equal_doubles(void **state)
     print_message("# moments: %.2g\n", worst);
 }
 
+static void lattice_trunks_equal_doubles(void **state)
+{
+    (void)state;
+    double worst = 0.0;
+    for (int v = 0; v < 16; v++) {
+        const model_random random = {.seed = 600 + (uint64_t)v,
+                                     .dimension = 2 + v % 2,
+                                     .spacing = SPACING,
+                                     .moments = 1 + v % 3,
+                                     .lattice = 1,
+                                     .levels = 3,
+                                     .transfer = 1 + v / 2 % 2,
+                                     .method = "voxel_corners",
+                                     .no_hysteresis = 1,
+                                     .bumps = 3,
+                                     .order = 1,
+                                     .fluid_only = 1,
+                                     .motion = 3,
+                                     .walls = v / 4 % 2,
+                                     .scale = 0.001,
+                                     .evaluate = v / 3 % 2 ? "current" : "advected"};
+        worst = fmax(worst, check("lattice", v, &random));
+    }
+    print_message("# lattices: %.2g\n", worst);
+}
+
 static void bases_equal_doubles(void **state)
 {
     (void)state;
@@ -277,6 +303,7 @@ int main(void)
         cmocka_unit_test(plain_outputs_equal_doubles),
         cmocka_unit_test(levels_equal_doubles),
         cmocka_unit_test(bases_equal_doubles),
+        cmocka_unit_test(lattice_trunks_equal_doubles),
         cmocka_unit_test(moments_equal_doubles),
         cmocka_unit_test(motion_and_its_damping_equal_doubles),
     };

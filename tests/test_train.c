@@ -418,6 +418,29 @@ static void gradients_of_moments_are_right(void **state)
     print_message("# moments: %.2g\n", worst);
 }
 
+static void gradients_of_lattice_trunks_are_right(void **state)
+{
+    (void)state;
+    double worst = 0.0;
+    for (int v = 0; v < 8; v++) {
+        gradient_case c = {.name = "lattice", .random = small_basis(1470 + (uint64_t)v, 2 + v % 2)};
+        c.random.fluid_only = 1;
+        c.random.moments = 2;
+        c.random.motion = 3;
+        c.random.lattice = 1;
+        c.random.levels = 3;
+        c.random.transfer = 1 + v / 2 % 2;
+        c.random.method = "voxel_corners";
+        c.random.no_hysteresis = 1;
+        c.random.walls = v / 4 % 2;
+        c.random.evaluate = v % 3 ? "advected" : "current";
+        c.horizon = 1 + v / 3 % 2;
+        c.samples = 6;
+        worst = fmax(worst, check_gradient(&c));
+    }
+    print_message("# lattices: %.2g\n", worst);
+}
+
 /* Everything at once. */
 static model_random everything(uint64_t seed, int dimension)
 {
@@ -976,6 +999,7 @@ int main(void)
         cmocka_unit_test(gradients_of_levels_are_right),
         cmocka_unit_test(gradients_of_motion_and_damping_are_right),
         cmocka_unit_test(gradients_of_moments_are_right),
+        cmocka_unit_test(gradients_of_lattice_trunks_are_right),
         cmocka_unit_test(gradients_of_rollouts_are_right),
         cmocka_unit_test(gradients_with_positions_as_constants_are_right),
         cmocka_unit_test(gradients_of_penalties_are_right),

@@ -13,6 +13,7 @@
 static const char *const evaluations[] = {"current", "advected", "advected_mean"};
 static const char *const features[] = {"one", "velocity", "normal", "motion", "gravity"};
 static const char *const samplings[] = {"voxel_centers", "voxel_corners", "farthest"};
+static const char *const sampled[] = {"all", "fluid"};
 static const char *const anchors[] = {"world", "centroid"};
 
 static void read_text(ascc_plan_builder *builder, ascc_reader *reader, uint32_t object,
@@ -64,6 +65,8 @@ static void read_levels(ascc_reader *reader, uint32_t root, ascc_plan *plan)
             ascc_reader_choice(reader, sampling, "anchor", anchors, COUNT(anchors));
     if (plan->sampling == ASCC_SAMPLING_CORNERS)
         plan->hysteresis = ascc_reader_number(reader, sampling, "hysteresis", 0.0, 0.5);
+    if (ascc_reader_has(reader, sampling, "points"))
+        plan->fluid_sampled = ascc_reader_choice(reader, sampling, "points", sampled, COUNT(sampled));
     ascc_reader_end(reader, sampling);
 
     ascc_reader_where(reader, "network 'levels'");

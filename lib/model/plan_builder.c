@@ -215,7 +215,7 @@ ascc_status ascc_plan_check_matrix(ascc_plan_builder *builder, ascc_term_entry *
     int32_t *index = &entry->tensor[ASCC_TENSOR_WEIGHT];
     const ascc_status status = ascc_plan_find_tensor(builder, name, 2, index);
     return status == ASCC_OK ? ascc_plan_check_inputs(builder, &builder->file->tensor[*index],
-                                                      entry->term.inputs, &entry->term.outputs)
+                                                      entry->term.gathered, &entry->term.outputs)
                              : status;
 }
 
@@ -291,7 +291,7 @@ static ascc_status check_term(ascc_plan_builder *builder, ascc_term_entry *entry
         return FAIL("layer '%s': a source that is not made before it",
                     ascc_quote(layer->name).text);
     term->inputs = ascc_plan_value_channels(plan, builder->layer, term->source);
-    term->outputs = term->inputs;
+    term->outputs = term->gathered = term->inputs;
     if (term->inputs == 0)
         return FAIL("layer '%s': a source without channels", ascc_quote(layer->name).text);
     const ascc_status status = term->operation->check(builder, layer, entry, name);

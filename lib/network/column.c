@@ -85,8 +85,13 @@ void ascc_column_forward(const ascc_tile *tile, const ascc_term *term, ascc_gath
         const ascc_neighborhood around =
             ascc_column_look(run, term, tile->list[r], tile->scratch, tile->room, tile->sequence);
         gather(run, term, &around, tile->column + r * stride);
-        ascc_matrix_add_bias(run, term, tile->sum + r * tile->width + term->column);
+        float *to = tile->sum + r * tile->width + term->column;
+        ascc_matrix_add_bias(run, term, to);
+        for (int32_t c = 0; !term->tensor[ASCC_TENSOR_WEIGHT] && c < term->outputs; c++)
+            to[c] += tile->column[r * stride + (size_t)c];
     }
+    if (!term->tensor[ASCC_TENSOR_WEIGHT])
+        return;
     run->tools->kernels->multiply(tile->column, stride, tile->n, length,
                                   ascc_term_packed(run, term), ascc_padded(term->outputs),
                                   tile->sum + term->column, tile->width);
@@ -134,20 +139,25 @@ void ascc_column_backward(const ascc_reverse *pass, const ascc_term *term, const
     const size_t length = ascc_matrix_length(term);
     const bool scatters =
         ascc_reverse_source(pass, term) || (ascc_term_is_relative(term) && pass->pass->velocity);
-    if (scatters || pass->pass->seen)
+    const bool weightless = !term->tensor[ASCC_TENSOR_WEIGHT];
+    if (weightless)
+        memcpy(pass->column_gradient, pass->tile, n * length * sizeof(float));
+    else if (scatters || pass->pass->seen)
         ascc_matrix_back(pass, term, n);
     for (size_t r = 0; r < n; r++) {
         const float *column_gradient = pass->column_gradient + r * length;
         const ascc_neighborhood around =
             ascc_column_look(pass->run, term, list[r], pass->scratch, pass->room, pass->sequence);
         gather(pass->run, term, &around, pass->column);
-        ascc_matrix_keep_column(pass, term, r);
+        if (!weightless)
+            ascc_matrix_keep_column(pass, term, r);
         if (pass->pass->seen)
             places(pass, term, &around, list[r], column_gradient);
         if (scatters)
             scatter_row(pass, term, &around, list[r], column_gradient, scatter);
     }
-    ascc_matrix_back_weights(pass, term, n);
+    if (!weightless)
+        ascc_matrix_back_weights(pass, term, n);
 }
 
 void ascc_column_add_displacement(const ascc_reverse *pass, const ascc_term *term, size_t row,

@@ -174,7 +174,7 @@ static ascc_status build_level_zero(ascc_hierarchy *h, const ascc_search_tools *
 static ascc_status build_level(ascc_hierarchy *h, const ascc_search_tools *tools,
                                const ascc_plan *plan, int level)
 {
-    const ascc_points *all = &h->set[ASCC_SET_ALL];
+    const ascc_points *all = &h->set[plan->fluid_sampled ? ASCC_SET_FLUID : ASCC_SET_ALL];
     ascc_points *samples = &h->set[ASCC_SET_LEVEL + level - 1];
     const double voxel = plan->level[level].voxel * h->scale.inverse;
     if (plan->sampling == ASCC_SAMPLING_FARTHEST)

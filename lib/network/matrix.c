@@ -7,13 +7,15 @@ size_t ascc_matrix_packed_size(const ascc_plan *plan, const ascc_term *term)
 {
     (void)plan;
     const size_t bias = term->tensor[ASCC_TENSOR_BIAS] ? 1 : 0;
+    if (!term->tensor[ASCC_TENSOR_WEIGHT])
+        return 0;
     return (ascc_matrix_length(term) + bias) * ascc_padded(term->outputs);
 }
 
 /* Walks the numbers of tensor [cells][inputs][outputs] and their places in the packed matrix. */
 #define EACH_WEIGHT(term)                                                                          \
-    const size_t cells = ascc_cell_count(&(term)->filter), a = (size_t)(term)->inputs;             \
-    const size_t b = (size_t)(term)->outputs, a8 = ascc_padded((term)->inputs);                    \
+    const size_t cells = ascc_cell_count(&(term)->filter), a = (size_t)(term)->gathered;           \
+    const size_t b = (size_t)(term)->outputs, a8 = ascc_padded((term)->gathered);                  \
     const size_t b8 = ascc_padded((term)->outputs), bias = cells * a8 * b8;                        \
     for (size_t c = 0; c < cells; c++)                                                             \
         for (size_t i = 0; i < a; i++)                                                             \

@@ -1,7 +1,7 @@
 /* What operations with one weight matrix and a bias have in common: packing, and the way back.
  * SPDX-License-Identifier: MIT
  *
- * Packed: [length][padded outputs], length = cells * padded inputs, then the bias [padded outputs].
+ * Packed: [length][padded outputs], length = cells * padded numbers of a cell, then the bias [padded outputs].
  */
 #ifndef ASCC_MATRIX_H
 #define ASCC_MATRIX_H
@@ -12,7 +12,7 @@
 /* Of one row's column: what is multiplied with the matrix. */
 static inline size_t ascc_matrix_length(const ascc_term *term)
 {
-    return ascc_cell_count(&term->filter) * ascc_padded(term->inputs);
+    return ascc_cell_count(&term->filter) * ascc_padded(term->gathered);
 }
 
 size_t ascc_matrix_packed_size(const ascc_plan *plan, const ascc_term *term);

@@ -11,8 +11,9 @@ static void read_transfer(ascc_reader *reader, uint32_t object, const ascc_plan 
                           ascc_term *term, const char *name[ASCC_MAX_TENSORS])
 {
     (void)plan;
-    name[ASCC_TENSOR_WEIGHT] = ascc_reader_text(reader, object, "weight");
-    name[ASCC_TENSOR_BIAS] = ascc_reader_optional_text(reader, object, "bias");
+    name[ASCC_TENSOR_WEIGHT] = ascc_reader_optional_text(reader, object, "weight");
+    if (name[ASCC_TENSOR_WEIGHT])
+        name[ASCC_TENSOR_BIAS] = ascc_reader_optional_text(reader, object, "bias");
     term->option[ASCC_OPTION_NORMALIZE] = ascc_reader_optional_flag(reader, object, "normalize");
 }
 
@@ -44,7 +45,7 @@ static ascc_status check(ascc_plan_builder *builder, const ascc_layer *layer,
                          ascc_term_entry *entry, const char *const name[ASCC_MAX_TENSORS])
 {
     ascc_status status = find_lengths(builder, layer, &entry->term);
-    if (status == ASCC_OK)
+    if (status == ASCC_OK && name[ASCC_TENSOR_WEIGHT])
         status = ascc_plan_check_matrix(builder, entry, name[ASCC_TENSOR_WEIGHT]);
     return status == ASCC_OK ? ascc_plan_check_bias(builder, entry, name[ASCC_TENSOR_BIAS])
                              : status;
@@ -65,8 +66,9 @@ static double cost(const ascc_plan *plan, const ascc_cost_counts *counts, int32_
     const int32_t source = ascc_plan_value_set(plan->layer, term->source);
     const double points = ascc_cost_points(counts, set), from = ascc_cost_points(counts, source);
     const bool up = ascc_cost_voxel(plan, set) < ascc_cost_voxel(plan, source);
+    const bool weight = term->tensor[ASCC_TENSOR_WEIGHT] != NULL;
     return (up ? points : from) * (double)(1 << plan->dimension) * term->inputs +
-           points * term->inputs * term->outputs;
+           (weight ? points * term->inputs * term->outputs : 0.0);
 }
 
 /* Hats become shares of their sum. */

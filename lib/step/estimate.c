@@ -30,7 +30,8 @@ static double set_points(const ascc_plan *plan, int32_t set, double fluid, doubl
     const ascc_level *level = &plan->level[set - ASCC_SET_LEVEL + 1];
     if (plan->sampling == ASCC_SAMPLING_FARTHEST)
         return all * level->ratio;
-    return SURFACE * all * power(plan->spacing / level->voxel, plan->dimension);
+    return SURFACE * (plan->fluid_sampled ? fluid : all) *
+           power(plan->spacing / level->voxel, plan->dimension);
 }
 
 /* Points of a set around a place inside it, a unit of volume. */

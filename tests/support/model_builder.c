@@ -337,6 +337,52 @@ static void add_dense(random_network *n, const char *name, const char *source, i
     add_weights(&n->builder, &n->state, name, n->o.dimension, 0, in, out, n->o.gain);
 }
 
+static void add_stencil(random_network *n, const char *name, const char *source,
+                        const char *options, int in, int out)
+{
+    const size_t taps = n->o.dimension == 2 ? 9 : 27;
+    const size_t shape[3] = {taps, (size_t)in, (size_t)out};
+    model_text_add(&n->text,
+                   "%s{\"type\":\"stencil\",\"source\":\"%s\",%s\"kernel\":\"%s.stencil\"}",
+                   n->terms++ ? "," : "", source, options, name);
+    char tensor[64];
+    snprintf(tensor, sizeof tensor, "%s.stencil", name);
+    add_random(&n->builder, &n->state, tensor, 3, shape, n->o.gain / sqrt((double)taps * in));
+}
+
+static void open_lattice_layer(random_network *n, const char *name, int level, int channels)
+{
+    model_text_add(&n->text, "{\"name\":\"%s\",\"points\":\"level%d\",\"channels\":%d,\"terms\":[",
+                   name, level, channels);
+    n->terms = 0;
+}
+
+/* A small lattice trunk of two levels: sums, stencils, restriction and prolongation. */
+static void add_lattice(random_network *n)
+{
+    const int d = n->o.dimension, sums = 2 + 2 * d, moments = sums * (2 * n->o.moments + 1);
+    const char *relative = "\"relative\":true,", *relu = "\"relu\":true,";
+    open_lattice_layer(n, "s1", 1, sums);
+    model_text_add(&n->text,
+                   "{\"type\":\"transfer\",\"source\":\"fluid\"},"
+                   "{\"type\":\"transfer\",\"source\":\"boundary\",\"column\":%d}]},",
+                   1 + d);
+    open_lattice_layer(n, "s2", 2, sums);
+    model_text_add(&n->text, "{\"type\":\"transfer\",\"source\":\"s1\"}]},");
+    open_lattice_layer(n, "d1", 1, 8);
+    add_stencil(n, "d1", "s1", relative, sums + d, 8);
+    add_transfer(n, "d1.sums", "sums", moments, 8);
+    model_text_add(&n->text, "]},");
+    open_lattice_layer(n, "d2", 2, 8);
+    add_stencil(n, "d2", "s2", relative, sums + d, 8);
+    add_transfer(n, "d2.down", "d1", 8, 8);
+    model_text_add(&n->text, "]},");
+    open_lattice_layer(n, "v1", 1, 8);
+    add_stencil(n, "v1", "d1", relu, 8, 8);
+    add_transfer(n, "v1.up", "d2", 8, 8);
+    model_text_add(&n->text, ",{\"type\":\"identity\",\"source\":\"d1\"}]},");
+}
+
 /* Moments of fluid and walls, and the first layer that reads them. */
 static void add_moments(random_network *n)
 {
@@ -349,11 +395,15 @@ static void add_moments(random_network *n)
         "\"basis\":{\"bumps\":%d},\"walls\":{\"radius\":%s,\"basis\":{\"bumps\":%d}}}]},",
         sums, model_number(n->o.radius * n->o.spacing), n->o.moments,
         model_number(1.2 * n->o.radius * n->o.spacing), n->o.moments + 1);
+    if (n->o.lattice)
+        add_lattice(n);
     model_text_add(&n->text, "{\"name\":\"l0.0\",\"points\":\"fluid\",\"channels\":%d,\"terms\":[",
                    n->o.channels);
     n->terms = 0;
+    if (n->o.lattice)
+        add_transfer(n, "up", "v1", 8, n->o.channels);
     add_dense(n, "dense_sums", "sums", 0, 0, sums, 2 * quarter);
-    add_dense(n, "dense_fluid", "fluid", 0, 2 * quarter, n->o.motion == 2 ? in - d : in,
+    add_dense(n, "dense_fluid", "fluid", 0, 2 * quarter, n->o.motion > 1 ? in - d : in,
               2 * quarter);
     model_text_add(&n->text, "]}");
 }
@@ -378,8 +428,8 @@ static void add_first_layer(random_network *n)
 static void add_trunk_layer(random_network *n, int layer)
 {
     const int last = layer == n->o.trunk_layers, c = n->o.channels;
-    const int sources = layer == 1 ? 1 : n->o.levels;
-    for (int d = 0; d < (last ? 1 : n->o.levels); d++) {
+    const int levels = n->o.lattice ? 1 : n->o.levels, sources = layer == 1 ? 1 : levels;
+    for (int d = 0; d < (last ? 1 : levels); d++) {
         char points[16], name[48], source[48];
         snprintf(points, sizeof points, d ? "level%d" : n->o.fluid_only ? "fluid" : "all", d);
         const int width = last && n->o.plain ? n->o.dimension : c;
@@ -416,10 +466,12 @@ static void add_head(random_network *n)
                    "\"particle_spacing\":%s,\"rest_density\":1000,\"evaluate\":\"%s\","
                    "\"features\":{\"fluid\":[%s%s],\"boundary\":[\"one\",\"normal\"%s]}",
                    o->dimension, model_number(0.005), third, model_number(o->spacing), o->evaluate,
-                   o->motion == 2   ? "\"motion\",\"one\""
+                   o->motion == 3   ? "\"one\",\"motion\""
+                   : o->motion == 2 ? "\"motion\",\"one\""
                    : o->motion == 1 ? "\"one\",\"velocity\",\"motion\""
                                     : "\"one\",\"velocity\"",
-                   o->gravity ? ",\"gravity\"" : "", o->motion ? ",\"motion\"" : "");
+                   o->gravity ? ",\"gravity\"" : "",
+                   o->motion && o->motion < 3 ? ",\"motion\"" : "");
     if (o->boundary_crop > 0.0)
         model_text_add(&n->text, ",\"boundary_crop\":%s",
                        model_number(o->boundary_crop * o->spacing));
@@ -431,7 +483,8 @@ static void add_head(random_network *n)
         model_text_add(
             &n->text, "%s{\"%s\":%s}", i > 1 ? "," : "", farthest ? "ratio" : "voxel",
             model_number(farthest ? 1.0 / (double)(1 << i) : o->spacing * (double)(1 << i)));
-    model_text_add(&n->text, "],\"sampling\":{\"method\":\"%s\"", o->method);
+    model_text_add(&n->text, "],\"sampling\":{\"method\":\"%s\"%s", o->method,
+                   o->lattice ? ",\"points\":\"fluid\"" : "");
     if (!farthest)
         model_text_add(&n->text, ",\"anchor\":\"%s\"", o->anchor);
     if (strcmp(o->method, "voxel_corners") == 0)

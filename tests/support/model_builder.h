@@ -76,13 +76,14 @@ typedef struct model_random {
     int no_hysteresis;      /* of voxel_corners: 0 in place of 0.1 */
     const char *type;       /* of the tensors; NULL = "F32" */
     int coarse;             /* 1: weights that F16 and BF16 hold exactly */
-    int motion; /* 1: the feature motion after the others; 2: in place of the velocity, before "one" */
+    int motion; /* 1: the feature motion after the others; 2: in place of the velocity, before "one"; 3: likewise, after */
     int gravity;    /* 1: the feature gravity of the fluid, after the others */
     int relative;   /* 1: convolutions of features see motion relative to the query's; fluid_only */
     int damping;    /* 1: of the last layer's pairs, and of its walls'; bumps, fluid_only, motion */
     int walls;      /* 1: the last layer acts on walls, with one bump more; bumps, fluid_only */
     double limit;   /* of what a pair gives, spacings; bumps; 0 = none */
     double contact; /* with walls, spacings; 0 = none */
+    int lattice; /* 1: with moments, levels 3, motion 3: a trunk of stencils on lattices where fluid is */
     int moments; /* bumps of a first layer of pair moments, walls with one more; fluid_only, motion; 0 = none */
     int direction;  /* 1: the last layer's pairs act along their present line; bumps, fluid_only */
 } model_random;

@@ -234,10 +234,11 @@ static oracle_record *build_sets(const oracle *o, const double *before, const do
     if (walls->count)
         memcpy(all->point + fluid->count, walls->point, walls->count * sizeof(point));
     for (int32_t l = 1; l < plan->level_count; l++)
-        r->set[ASCC_SET_LEVEL + l - 1] = old ? copy_set(&old->set[ASCC_SET_LEVEL + l - 1])
-                                         : plan->sampling == ASCC_SAMPLING_FARTHEST
-                                             ? sample_farthest(plan, all, plan->level[l].ratio)
-                                             : sample_voxels(plan, all, plan->level[l].voxel);
+        r->set[ASCC_SET_LEVEL + l - 1] =
+            old ? copy_set(&old->set[ASCC_SET_LEVEL + l - 1])
+            : plan->sampling == ASCC_SAMPLING_FARTHEST
+                ? sample_farthest(plan, plan->fluid_sampled ? fluid : all, plan->level[l].ratio)
+                : sample_voxels(plan, plan->fluid_sampled ? fluid : all, plan->level[l].voxel);
     return r;
 }
 
@@ -516,8 +517,65 @@ static void transfer(const network_state *n, const ascc_layer *layer, const ascc
     for (int32_t a = 0;
          term->option[ASCC_OPTION_NORMALIZE] != 0.0 && hats > 0.0 && a < term->inputs; a++)
         in[a] /= hats;
-    add_product(n, term, 0, in, out);
+    for (int32_t a = 0; !term->tensor[ASCC_TENSOR_WEIGHT] && a < term->inputs; a++)
+        out[a] += in[a];
+    if (term->tensor[ASCC_TENSOR_WEIGHT])
+        add_product(n, term, 0, in, out);
     free(in);
+}
+
+/* What the taps of a stencil read, [tap][channel], x fastest; corners that are not there are 0. */
+static double *read_taps(const network_state *n, const ascc_term *term, const point *query)
+{
+    const ascc_plan *plan = &n->o->model->plan;
+    const int32_t set_number = n->value[term->source].set, d = plan->dimension;
+    const point_set *set = &n->sets->set[set_number];
+    const double voxel = plan->level[set_number - ASCC_SET_LEVEL + 1].voxel;
+    double *tap = take(27 * (size_t)term->inputs, sizeof *tap);
+    for (size_t j = 0; j < set->count; j++) {
+        int number = 0, near = 1;
+        for (int c = d - 1; c >= 0; c--) {
+            const double steps = round((set->point[j].x[c] - query->x[c]) / voxel);
+            near &= fabs(steps) <= 1.0;
+            number = number * 3 + (int)fmax(-1.0, fmin(1.0, steps)) + 1;
+        }
+        for (int32_t a = 0; near && a < term->inputs; a++)
+            tap[number * term->inputs + a] = read_value(n, term->source, term->rectify != 0, j, a);
+    }
+    return tap;
+}
+
+static void stencil(const network_state *n, const ascc_layer *layer, const ascc_term *term,
+                    size_t row, double *out)
+{
+    const int d = n->o->model->plan.dimension, taps = d == 2 ? 9 : 27;
+    const bool sums = term->option[3] != 0.0;
+    const int32_t in = term->inputs, reads = in + (sums ? d : 0);
+    double *tap = read_taps(n, term, &n->sets->set[layer->set].point[row]);
+    double mass = 0.0, u[3] = {0.0, 0.0, 0.0};
+    for (int t = 0; sums && t < taps; t++) {
+        double w = 1.0;
+        for (int c = 0, at = t; c < d; c++, at /= 3)
+            w *= at % 3 == 1 ? 0.5 : 0.25;
+        mass += w * tap[t * in];
+        for (int c = 0; c < d; c++)
+            u[c] += w * tap[t * in + 1 + c];
+    }
+    for (int t = 0; t < taps; t++) {
+        double x[64];
+        for (int32_t a = 0; a < in; a++)
+            x[a] = tap[t * in + a];
+        for (int c = 0; sums && c < d; c++) {
+            const double mean = mass > 0.0 ? u[c] / mass : 0.0;
+            x[1 + c] -= x[0] * mean;
+            x[in + c] = -x[1 + d] * mean;
+        }
+        for (int32_t b = 0; b < term->outputs; b++)
+            for (int32_t a = 0; a < reads; a++)
+                out[b] += x[a] * weight_at(n->o, term->tensor[ASCC_TENSOR_WEIGHT],
+                                           (size_t)((t * reads + a) * term->outputs + b));
+    }
+    free(tap);
 }
 
 /* The source's row that is the layer's; false where there is none. */
@@ -543,6 +601,8 @@ static void add_term(const network_state *n, const ascc_layer *layer, const ascc
         return;
     if (term->operation == &ascc_op_grid || term->operation == &ascc_op_basis) {
         convolve(n, layer, term, row, out);
+    } else if (term->operation == &ascc_op_stencil) {
+        stencil(n, layer, term, row, out);
     } else if (term->operation == &ascc_op_moments) {
         add_moments(n, term, row, out);
     } else if (term->operation == &ascc_op_transfer) {
