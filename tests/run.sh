@@ -1,7 +1,22 @@
 #!/bin/sh
 # Sets up, builds and runs all tests: release and sanitizers. Ends with "N passed, N failed".
 # SPDX-License-Identifier: MIT
+#
+#   sh tests/run.sh [--long]     --long: a minute of each fuzz target, and more random calls and scenes
 set -u
+long=
+fuzz_seconds=3
+case ${1:-} in
+--long)
+    long=yes
+    fuzz_seconds=60
+    ;;
+'') ;;
+*)
+    echo "usage: sh tests/run.sh [--long]" >&2
+    exit 2
+    ;;
+esac
 cd "$(dirname "$0")/.." || exit 1
 . tests/setup.sh
 setup || exit 1
@@ -52,22 +67,29 @@ suite() {
     done
 }
 
-# A script that prints TAP lines itself.
+# A script that prints TAP lines itself, and what it is given.
 script() {
-    echo "== $1"
+    echo "== $*"
     log="build-release/$(basename "$1").log"
     sh "$@" >"$log" 2>&1 || { [ "$(failures "$log")" -gt 0 ] || { tail -n 25 "$log"; failed=$((failed + 1)); }; }
     count "$log"
 }
 
+if [ -n "$long" ]; then
+    export ASCC_TEST_LONG=1
+    echo "long: $fuzz_seconds s of each of the $(ls tests/fuzz/corpus | wc -l) fuzz targets, two at a time; ten times the"
+    echo "random calls (test_api_fuzz) and random scenes (test_random_scenes)"
+fi
 export ASAN_OPTIONS=detect_leaks=1
+export UBSAN_OPTIONS=halt_on_error=1:print_stacktrace=1
 suite release --buildtype=release
 suite sanitize --buildtype=debugoptimized -Db_sanitize=address,undefined -Db_lundef=false \
-    -Db_ndebug=false
+    -Db_ndebug=false -Dc_args=-fsanitize=float-cast-overflow
 for t in tests/check_tree.sh tests/install_test.sh tests/cli_test.sh tests/train_test.sh tests/docs_test.sh tests/convert_test.sh tests/bench_test.sh tests/stability_test.sh tests/cross_test.sh; do
     [ -f "$t" ] && script "$t" build-release
 done
 script tests/models_test.sh build-release
+script tests/fuzz_test.sh build-sanitize "$fuzz_seconds"
 script tests/cli_test.sh build-sanitize
 script tests/train_test.sh build-sanitize
 

@@ -1,5 +1,5 @@
-/* libFuzzer entry: loads a model from bytes, as they are and as a published network, and checks what
- * every plan promises.
+/* Loads a model from bytes, as they are and as a published network; if it loads, checks what every plan promises
+ * and runs it on a small scene.
  * SPDX-License-Identifier: MIT
  *
  * The first byte says what the rest is, so that the fuzzer reaches beyond the header's length field
@@ -11,21 +11,16 @@
  *   'd'  the architecture of a published DMCF network, likewise
  *   'c'  that of a published CConv network
  */
-#include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
 
+#include "fuzz.h"
+#include "fuzz_model.h"
 #include "model/model.h"
 #include "published.h"
 #include "support/model_builder.h"
 
-int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
-
-static void require(int condition)
-{
-    if (!condition)
-        abort();
-}
+int fuzz_model_runs = 1;
 
 static float sum; /* keeps the reads below */
 
@@ -44,13 +39,13 @@ static void check_plan(const ascc_plan *plan)
 {
     for (int32_t i = 0; i < plan->layer_count; i++) {
         const ascc_layer *layer = &plan->layer[i];
-        require(layer->set >= 0 && layer->set < ASCC_SET_LEVEL + plan->level_count - 1);
-        require(layer->term_count > 0 && layer->channels > 0);
+        fuzz_require(layer->set >= 0 && layer->set < ASCC_SET_LEVEL + plan->level_count - 1);
+        fuzz_require(layer->term_count > 0 && layer->channels > 0);
         for (int32_t t = layer->first_term; t < layer->first_term + layer->term_count; t++) {
             const ascc_term *term = &plan->term[t];
             const size_t pairs = (size_t)term->inputs * (size_t)term->outputs;
-            require(term->source >= 0 && term->source <= i + 1);
-            require(term->column >= 0 && term->column + term->outputs <= layer->channels);
+            fuzz_require(term->source >= 0 && term->source <= i + 1);
+            fuzz_require(term->column >= 0 && term->column + term->outputs <= layer->channels);
             if (term->tensor[ASCC_TENSOR_WEIGHT])
                 read_all(term->tensor[ASCC_TENSOR_WEIGHT], cell_count(&term->filter) * pairs);
             if (term->tensor[ASCC_TENSOR_BIAS])
@@ -58,7 +53,7 @@ static void check_plan(const ascc_plan *plan)
         }
     }
     const ascc_output *output = &plan->output;
-    require(output->term.source >= 0 && output->term.source < plan->layer_count + 2);
+    fuzz_require(output->term.source >= 0 && output->term.source < plan->layer_count + 2);
     if (output->conserves)
         read_all(output->term.tensor[ASCC_TENSOR_WEIGHT],
                  cell_count(&output->term.filter) * (size_t)output->term.inputs *
@@ -75,12 +70,14 @@ static void load_model(const void *bytes, size_t size)
     if (ascc_model_load_memory(context, bytes, size, &model) == ASCC_OK) {
         ascc_model_info info = {.size = sizeof info};
         size_t kept = 0;
-        require(ascc_model_get_info(model, &info) == ASCC_OK);
-        require(memcmp(ascc_model_bytes(model, &kept), bytes, size) == 0 && kept == size);
+        fuzz_require(ascc_model_get_info(model, &info) == ASCC_OK);
+        fuzz_require(memcmp(ascc_model_bytes(model, &kept), bytes, size) == 0 && kept == size);
         check_plan(&model->plan);
+        if (fuzz_model_runs)
+            fuzz_step_model(context, model);
     } else {
         char text[16];
-        require(model == NULL && ascc_context_message(context, text, sizeof text) > 0);
+        fuzz_require(model == NULL && ascc_context_message(context, text, sizeof text) > 0);
     }
     ascc_model_destroy(&model);
     ascc_context_destroy(&context);
@@ -91,26 +88,18 @@ static void load(const void *bytes, size_t size)
     size_t made = 0;
     char why[256] = "";
     unsigned char *converted = ascc_published_convert(bytes, size, &made, why, sizeof why);
-    require(converted || why[0]);
+    fuzz_require(converted || why[0]);
     load_model(bytes, size);
     if (converted)
         load_model(converted, made);
     free(converted);
 }
 
-/* A file around a header that may hold any bytes. */
 static void load_header(const uint8_t *data, size_t size)
 {
-    const uint8_t *end = size ? memchr(data, 0xff, size) : NULL;
-    const size_t length = end ? (size_t)(end - data) : size, rest = end ? size - length - 1 : 0;
-    unsigned char *bytes = malloc(8 + length + rest);
-    require(bytes != NULL);
-    for (int i = 0; i < 8; i++)
-        bytes[i] = (unsigned char)((uint64_t)length >> 8 * i);
-    memcpy(bytes + 8, data, length);
-    if (rest > 0)
-        memcpy(bytes + 8 + length, end + 1, rest);
-    load(bytes, 8 + length + rest);
+    size_t made;
+    unsigned char *bytes = fuzz_with_header(data, size, &made);
+    load(bytes, made);
     free(bytes);
 }
 
@@ -119,7 +108,7 @@ static void load_text(const uint8_t *data, size_t size, char kind)
 {
     char *text = malloc(size + 1);
     size_t made;
-    require(text != NULL);
+    fuzz_require(text != NULL);
     memcpy(text, data, size);
     text[size] = '\0';
     for (size_t i = 0; i < size; i++)
