@@ -64,7 +64,8 @@ typedef struct fuzzing {
 /* What a worker leaves to its parent. */
 typedef struct progress {
     uint64_t at;      /* the input that runs */
-    uint64_t checked; /* inputs before this one do not leak */
+    uint64_t checked; /* inputs before this one were not seen to leak at two searches */
+    uint64_t last;    /* search */
 } progress;
 
 static void *make(size_t size)
@@ -330,8 +331,17 @@ static bytes input_of(const fuzzing *f, uint64_t k)
 
 /* ---- Running ---- */
 
+/* What earlier calls left on the stack may point to what they have lost. */
+static __attribute__((noinline)) void wipe_stack(void)
+{
+    volatile uint8_t wiped[1 << 16];
+    for (size_t i = 0; i < sizeof wiped; i++)
+        wiped[i] = 0;
+}
+
 static bool leaks(void)
 {
+    wipe_stack();
     return __lsan_do_recoverable_leak_check && __lsan_do_recoverable_leak_check() != 0;
 }
 
@@ -340,23 +350,31 @@ static bool over(const fuzzing *f, uint64_t k, double begin)
     return k >= f->corpus.count && (k - f->corpus.count >= f->runs || now() - begin >= f->seconds);
 }
 
-/* In a process of its own, from input `first`; `careful`: looks for leaks behind each up to `until`. */
+static void run_input(const fuzzing *f, uint64_t k)
+{
+    bytes input = input_of(f, k);
+    (void)alarm(PATIENCE);
+    (void)LLVMFuzzerTestOneInput(input.data, input.size);
+    (void)alarm(0);
+    free(input.data);
+}
+
+/* In a process of its own, from input `first` until the time is over, or up to `until` if that is not 0. Leaks
+ * are looked for now and then, or at the end. */
 static void work(const fuzzing *f, progress *p, uint64_t first, uint64_t until, double begin)
 {
-    const bool careful = until > first;
-    for (uint64_t k = first; careful ? k < until : !over(f, k, begin); k++) {
-        bytes input = input_of(f, k);
+    for (uint64_t k = first; until ? k < until : !over(f, k, begin); k++) {
         p->at = k;
-        (void)alarm(PATIENCE);
-        (void)LLVMFuzzerTestOneInput(input.data, input.size);
-        (void)alarm(0);
-        free(input.data);
-        if (careful || k < f->corpus.count || k % LEAK_BATCH == 0) {
+        run_input(f, k);
+        if (!until && (k < f->corpus.count || k % LEAK_BATCH == 0)) {
             if (leaks())
                 _exit(STATUS_LEAK);
-            p->checked = k + 1;
+            p->checked = p->last;
+            p->last = k + 1;
         }
     }
+    for (int n = 0; until && n < 32; n++)
+        run_input(f, 0); /* so that nothing points to what is lost any more */
     p->at++;
     _exit(leaks() ? STATUS_LEAK : 0);
 }
@@ -389,26 +407,42 @@ static void keep(const fuzzing *f, uint64_t k, const char *kind)
     free(input.data);
 }
 
+static bool is_leak(int status)
+{
+    return WIFEXITED(status) && WEXITSTATUS(status) == STATUS_LEAK;
+}
+
+/* The input of [first, until) that leaks, by halving; the last one if none does alone. */
+static uint64_t find_leak(const fuzzing *f, progress *p, uint64_t first, uint64_t until)
+{
+    while (until - first > 1) {
+        const uint64_t middle = first + (until - first) / 2;
+        if (is_leak(run_worker(f, p, first, middle, 0.0)))
+            until = middle;
+        else
+            first = middle;
+    }
+    return first;
+}
+
 /* Failures. */
 static int fuzz(const fuzzing *f, progress *p)
 {
     const double begin = now();
     int failures = 0;
     for (uint64_t next = 0; failures < MOST_FAILURES;) {
-        p->checked = next;
-        int status = run_worker(f, p, next, 0, begin);
+        p->checked = p->last = next;
+        const int status = run_worker(f, p, next, 0, begin);
         if (status == 0)
             break;
-        const char *kind = "crash";
-        if (WIFEXITED(status) && WEXITSTATUS(status) == STATUS_LEAK) {
-            const uint64_t last = p->at;
-            status = run_worker(f, p, p->checked, last + 1, begin);
+        const char *kind = WIFSIGNALED(status) && WTERMSIG(status) == SIGALRM ? "timeout" : "crash";
+        uint64_t at = p->at;
+        next = at + 1;
+        if (is_leak(status)) {
             kind = "leak";
-        } else if (WIFSIGNALED(status) && WTERMSIG(status) == SIGALRM) {
-            kind = "timeout";
+            at = find_leak(f, p, p->checked, next);
         }
-        keep(f, p->at, kind);
-        next = p->at + 1;
+        keep(f, at, kind);
         failures++;
     }
     return failures;
