@@ -6,7 +6,7 @@
 #   sh tests/fuzz/run.sh [SECONDS]         FUZZ_SEED=7 in the environment chooses other inputs
 cd "$(dirname "$0")/../.." || exit 1
 total=${1:-3600}
-build=build-fuzz
+build=$PWD/build-fuzz # whole: one target changes its folder
 seed=${FUZZ_SEED:-$(date +%s)}
 
 if echo 'int LLVMFuzzerTestOneInput(const char *d, unsigned long n) { return d && n && 0; }' |
@@ -21,11 +21,11 @@ echo "fuzzing with $compiler $options, seed $seed; build-fuzz.log has the build"
 if [ ! -d $build ]; then
     # shellcheck disable=SC2086
     CC=$compiler meson setup $build --buildtype=debugoptimized -Db_lundef=false -Db_ndebug=false $options \
-        >$build.log 2>&1 || { tail -n 20 $build.log; exit 1; }
+        >"$build.log" 2>&1 || { tail -n 20 $build.log; exit 1; }
 fi
 targets=$(ls tests/fuzz/corpus)
 # shellcheck disable=SC2046
-ninja -C $build $(echo "$targets" | sed 's|^|tests/fuzz/fuzz_|') >>$build.log 2>&1 ||
+ninja -C $build $(echo "$targets" | sed 's|^|tests/fuzz/fuzz_|') >>"$build.log" 2>&1 ||
     { tail -n 20 $build.log; exit 1; }
 
 seconds=$((total * 2 / $(echo "$targets" | wc -w)))
@@ -42,7 +42,7 @@ fuzz() {
     : >"$build/crashes/$1.log"
     while left=$((end - $(date +%s))) && [ $left -gt 0 ] && [ $attempt -lt 20 ]; do
         "$build/tests/fuzz/fuzz_$1" -max_total_time=$left -seed=$((seed + attempt)) -timeout=60 -rss_limit_mb=4096 \
-            -dict=tests/fuzz/words.dict "-artifact_prefix=$build/crashes/$1-" "$found" "tests/fuzz/corpus/$1" \
+            -dict=tests/fuzz/words.dict "-artifact_prefix=$build/crashes/$1-" "$found" "$PWD/tests/fuzz/corpus/$1" \
             >>"$build/crashes/$1.log" 2>&1 || echo "fault" >>"$build/crashes/$1.log"
         attempt=$((attempt + 1))
     done
