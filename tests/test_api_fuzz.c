@@ -16,7 +16,7 @@
 #include "support/test.h"
 
 #if defined(__SANITIZE_ADDRESS__)
-#define SEQUENCES 1000
+#define SEQUENCES 500
 #else
 #define SEQUENCES 10000
 #endif
