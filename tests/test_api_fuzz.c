@@ -710,15 +710,20 @@ static ascc_particles *reversed_twin(sequence *s, ascc_context *context, bool *s
     return twin;
 }
 
-/* Two rows of a kind are at one place: their order among the neighbours of others is that of their ids. */
+/* Two rows of a kind are at one place, or where the network cannot tell them apart: then their order among the
+ * neighbours of others is that of their ids. */
 static bool has_coincident(const sequence *s)
 {
     for (int kind = 0; kind < 2; kind++)
         for (size_t i = 0; i < s->count[kind]; i++)
-            for (size_t j = 0; j < i; j++)
-                if (memcmp(s->row[kind][i].position, s->row[kind][j].position,
-                           s->width * sizeof(double)) == 0)
+            for (size_t j = 0; j < i; j++) {
+                double farthest = 0.0;
+                for (size_t c = 0; c < s->width; c++)
+                    farthest = fmax(
+                        farthest, fabs(s->row[kind][i].position[c] - s->row[kind][j].position[c]));
+                if (farthest < 1e-6 * spacing)
                     return true;
+            }
     return false;
 }
 
