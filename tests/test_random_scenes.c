@@ -133,9 +133,10 @@ static void open_scene(scene *s, const shipped *all, int network, uint64_t seed)
                                             .spacing = h,
                                             .mass =
                                                 s->info.rest_density * pow(h, s->info.dimension)};
+    const double time_step = s->info.time_step * of_any_size(s, 0.1, 3.0);
     const ascc_step_options step = {
         .size = sizeof step,
-        .time_step = once_in(s, 3) ? s->info.time_step * of_any_size(s, 0.1, 3.0) : 0.0};
+        .time_step = once_in(s, 3) ? fmax(time_step, s->info.time_step_min) : 0.0};
     for (int twin = 0; twin < 2; twin++) {
         ascc_context *context = twin ? all->three : all->one;
         CHECK(ascc_particles_create(context, &options, &s->particles[twin]) == ASCC_OK);
