@@ -32,7 +32,7 @@ static ascc_trainer *open_trainer(void)
                                              .gravity = {0.0, -9.81, 0.0}};
     ascc_trainer *trainer = NULL;
     size_t size;
-    unsigned char *bytes = model_builder_random(&trainees[0], &size);
+    unsigned char *bytes = model_builder_random(&trainees[1], &size);
     fuzz_require(ascc_trainer_create(&options, bytes, size, &trainer) == ASCC_OK);
     fuzz_require(ascc_trainer_add_sequence(trainer, &sequence) == ASCC_OK);
     free(bytes);
