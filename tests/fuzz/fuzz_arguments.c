@@ -18,10 +18,10 @@ enum { ARGUMENTS = 16, LONGEST = 2000 };
 static const struct {
     const char *name;
     int (*run)(int argc, char **argv);
-} commands[] = {{"sim", ascc_command_sim},    {"info", ascc_command_info},
-                {"show", ascc_command_show},  {"generate", ascc_command_generate},
-                {"lint", ascc_command_lint},  {"eval", ascc_command_eval},
-                {"train", ascc_command_train}};
+} commands[] = {{"sim", ascc_command_sim},     {"info", ascc_command_info},
+                {"show", ascc_command_show},   {"generate", ascc_command_generate},
+                {"lint", ascc_command_lint},   {"eval", ascc_command_eval},
+                {"train", ascc_command_train}, {"convert", ascc_command_convert}};
 
 /* No other folder; numbers of one digit, or so many that they are refused anyway. */
 static int is_harmless(const char *text)

@@ -287,6 +287,7 @@ static void write_arguments(void)
         "eval\npbf\ns",
         "train\nc\n--resume\n--iterations\n3\n--threads\n2",
         "train\n--help",
+        "convert\nm\n-o\nout",
         "sim\n--help"};
     for (size_t i = 0; i < sizeof lines / sizeof *lines; i++) {
         char name[32];
