@@ -247,7 +247,10 @@ static double count_flops(const subject *s)
     double *x = malloc((s->count + s->walls + 1) * d * sizeof *x);
     const ascc_array fluid = {.data = x, .scalar = ASCC_DOUBLE};
     const ascc_array wall = {.data = x + s->count * d, .scalar = ASCC_DOUBLE};
-    const ascc_scene scene = {s->count, s->walls, x, x + s->count * d};
+    const ascc_scene scene = {.fluid_count = s->count,
+                              .boundary_count = s->walls,
+                              .fluid = x,
+                              .boundary = x + s->count * d};
     if (!x || ascc_particles_get(s->particles, ASCC_FLUID, ASCC_POSITION, 0, s->count, &fluid) ||
         (s->walls &&
          ascc_particles_get(s->particles, ASCC_BOUNDARY, ASCC_POSITION, 0, s->walls, &wall)))

@@ -367,7 +367,8 @@ static void add_bad_boundary(sequence *s)
         n[0] = 1.1;
         break;
     case 2:
-        n[1] = bad_number(s); /* which has no length of 1 */
+        n[1] = bad_number(s);
+        wanted = ASCC_ERROR_NOT_FINITE;
         break;
     case 3:
         x[1] = bad_number(s);
@@ -710,23 +711,6 @@ static ascc_particles *reversed_twin(sequence *s, ascc_context *context, bool *s
     return twin;
 }
 
-/* Two rows of a kind are at one place, or where the network cannot tell them apart: then their order among the
- * neighbours of others is that of their ids. */
-static bool has_coincident(const sequence *s)
-{
-    for (int kind = 0; kind < 2; kind++)
-        for (size_t i = 0; i < s->count[kind]; i++)
-            for (size_t j = 0; j < i; j++) {
-                double farthest = 0.0;
-                for (size_t c = 0; c < s->width; c++)
-                    farthest = fmax(
-                        farthest, fabs(s->row[kind][i].position[c] - s->row[kind][j].position[c]));
-                if (farthest < 1e-6 * spacing)
-                    return true;
-            }
-    return false;
-}
-
 /* Both go the same way for some steps; 7 threads, 2, or 1. */
 static void run_beside_twin(sequence *s)
 {
@@ -734,7 +718,7 @@ static void run_beside_twin(sequence *s)
     bool same = true;
     const int32_t steps = (int32_t)below(s, 4);
     ascc_context *context = contexts[below(s, SIZES)];
-    const bool reversed = once_in(s, 2) && !has_coincident(s);
+    const bool reversed = once_in(s, 2);
     ascc_particles *twin = reversed ? reversed_twin(s, context, &same) : restored_twin(s, context);
     ascc_step *step = NULL;
     some_forces(s, &p);

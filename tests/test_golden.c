@@ -361,7 +361,10 @@ static void run_layers(network_case *n, test_tools *t, ascc_network *network, as
             wall[i * b + c] = b == 3   ? (float)n->normal[i * 3 + c]
                               : c == 0 ? 1.0f
                                        : (float)n->normal[i * 3 + c - 1];
-    const ascc_scene scene = {n->fluid_count, n->wall_count, x, n->wall};
+    const ascc_scene scene = {.fluid_count = n->fluid_count,
+                              .boundary_count = n->wall_count,
+                              .fluid = x,
+                              .boundary = n->wall};
     assert_int_equal(ascc_network_create(network, &t->context->allocator, p, &n->model->packed,
                                          8192, &t->message),
                      ASCC_OK);

@@ -68,7 +68,10 @@ static void open_case(network_case *c, const model_random *random, bool forward)
     double *boundary = lattice(&d, walls, plan->dimension, true);
     float *in = features(&d, c->fluid_count * (size_t)plan->fluid_channels);
     float *wall_in = features(&d, walls * (size_t)plan->boundary_channels);
-    const ascc_scene scene = {c->fluid_count, walls, fluid, boundary};
+    const ascc_scene scene = {.fluid_count = c->fluid_count,
+                              .boundary_count = walls,
+                              .fluid = fluid,
+                              .boundary = boundary};
     ascc_message message;
     assert_int_equal(ascc_network_create(&c->network, &c->context->allocator, plan,
                                          &c->model->packed, 4096, &message),
@@ -334,7 +337,7 @@ static void more_than_2_to_the_32_rows_are_an_error(void **state)
     network_case c;
     open_case(&c, &random, false);
     for (size_t i = 0; i < sizeof counts / sizeof *counts; i++) {
-        const ascc_scene scene = {counts[i][0], counts[i][1], NULL, NULL};
+        const ascc_scene scene = {.fluid_count = counts[i][0], .boundary_count = counts[i][1]};
         ascc_hierarchy h;
         assert_int_equal(ascc_hierarchy_build(&h, &c.tools.search, &c.model->plan, &scene),
                          ASCC_ERROR_RANGE);

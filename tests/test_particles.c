@@ -695,7 +695,7 @@ static void a_failed_add_of_boundary_changes_nothing(void **state)
     } cases[] = {
         {0, 3, NAN, ASCC_ERROR_NOT_FINITE, "position: row 1 component 1 is nan"},
         {0, 3, 1e300, ASCC_ERROR_RANGE, "position: row 1 component 1 is 1e+300"},
-        {1, 5, NAN, ASCC_ERROR_ARGUMENT, "normal: row 2 component 1 is nan"},
+        {1, 5, NAN, ASCC_ERROR_NOT_FINITE, "normal: row 2 component 1 is nan"},
         {1, 4, 1.0011, ASCC_ERROR_ARGUMENT, "normal: row 2 has length 1.0011"},
         {1, 4, -0.9989, ASCC_ERROR_ARGUMENT, "normal: row 2 has length 0.9989"},
         {1, 4, 1e200, ASCC_ERROR_ARGUMENT, "normal: row 2 has length inf"},

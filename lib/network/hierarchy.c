@@ -93,6 +93,60 @@ static void gather(void *data, size_t begin, size_t end, int32_t slot)
     job->first[begin / job->part] = fluid;
 }
 
+/* a before b, or 0 where a row of numbers is the same. */
+static int compare_rows(const double *from, size_t width, size_t a, size_t b)
+{
+    for (size_t c = 0; from && c < width; c++)
+        if (from[a * width + c] != from[b * width + c])
+            return from[a * width + c] < from[b * width + c] ? -1 : 1;
+    return 0;
+}
+
+/* The order of two of the host's rows at one place: fluid first, then by all that is known of them. */
+static bool comes_first(const sort_in *job, uint32_t a, uint32_t b)
+{
+    const ascc_scene *scene = job->scene;
+    const size_t d = (size_t)job->dimension, fluid = scene->fluid_count;
+    if ((a < fluid) != (b < fluid))
+        return a < fluid;
+    int order = 0;
+    if (a < fluid) {
+        order = compare_rows(scene->fluid, d, a, b);
+        order = order ? order : compare_rows(scene->velocity, d, a, b);
+        order = order ? order : compare_rows(scene->mass, 1, a, b);
+    } else {
+        order = compare_rows(scene->boundary, d, a - fluid, b - fluid);
+        order = order ? order : compare_rows(scene->normal, d, a - fluid, b - fluid);
+    }
+    return order ? order < 0 : a < b;
+}
+
+static bool at_one_place(const ascc_points *p, size_t a, size_t b)
+{
+    return p->position[0][a] == p->position[0][b] && p->position[1][a] == p->position[1][b] &&
+           p->position[2][a] == p->position[2][b];
+}
+
+/* Points at one place that begin in [begin, end), in an order that is not the host's. */
+static void break_ties(void *data, size_t begin, size_t end, int32_t slot)
+{
+    (void)slot;
+    const sort_in *job = data;
+    const ascc_points *all = &job->hierarchy->set[ASCC_SET_ALL];
+    uint32_t *origin = job->hierarchy->origin;
+    for (size_t i = begin; i < end; i++) {
+        if (i > 0 && at_one_place(all, i - 1, i))
+            continue; /* of a place that began earlier */
+        for (size_t n = i + 1; n < all->count && at_one_place(all, i, n); n++) {
+            const uint32_t moved = origin[n];
+            size_t j = n;
+            for (; j > i && comes_first(job, moved, origin[j - 1]); j--)
+                origin[j] = origin[j - 1];
+            origin[j] = moved;
+        }
+    }
+}
+
 /* Splits the whole into its two parts and links the rows. */
 static void split(void *data, size_t begin, size_t end, int32_t slot)
 {
@@ -165,6 +219,7 @@ static ascc_status build_level_zero(ascc_hierarchy *h, const ascc_search_tools *
         return status;
     ascc_workers_run(tools->workers, count, job.part, gather, &job);
     (void)ascc_part_sums(job.first);
+    ascc_workers_run(tools->workers, count, 4096, break_ties, &job);
     ascc_workers_run(tools->workers, count, job.part, split, &job);
     h->extent.set[0] = &h->set[ASCC_SET_ALL]; /* the same points, where they stay */
     ascc_arena_return(arena, mark);

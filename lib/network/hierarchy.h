@@ -30,6 +30,8 @@ typedef struct ascc_hierarchy {
 typedef struct ascc_scene {
     size_t fluid_count, boundary_count;
     const double *fluid, *boundary; /* [count][dimension] */
+    /* What tells particles at one place apart, so that the host's order does not; NULL = nothing: */
+    const double *velocity, *mass, *normal; /* [fluid][dimension], [fluid], [boundary][dimension] */
 } ascc_scene;
 
 /* Builds all sets the plan uses in the arena. errors: MEMORY, RANGE. */

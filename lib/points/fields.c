@@ -60,8 +60,8 @@ static ascc_status check_normal(const ascc_candidate *row, ascc_message *message
     double square = 0;
     for (int32_t c = 0; c < row->numbers; c++) {
         if (!isfinite(normal[c]))
-            return ascc_fail_number(message, ASCC_ERROR_ARGUMENT, row->name, row->row, c, normal[c],
-                                    "");
+            return ascc_fail_number(message, ASCC_ERROR_NOT_FINITE, row->name, row->row, c,
+                                    normal[c], "");
         square += normal[c] * normal[c];
     }
     if (fabs(sqrt(square) - 1) <= 1e-3)

@@ -75,7 +75,11 @@ ascc_status ascc_stage_sight(ascc_step_state *state)
     const ascc_search_tools *tools = &state->tools;
     const ascc_particles *p = state->particles;
     const size_t d = (size_t)p->dimension;
-    ascc_scene scene = {.fluid_count = p->fluid_count, .boundary_count = p->boundary_count};
+    ascc_scene scene = {.fluid_count = p->fluid_count,
+                        .boundary_count = p->boundary_count,
+                        .velocity = state->advance.velocity,
+                        .mass = p->mass,
+                        .normal = p->wall_normal};
     state->before_features = ascc_arena_mark_of(tools->arena);
     const bool room = lend_features(state);
     const ascc_arena_mark before_scene = ascc_arena_mark_of(tools->arena);
