@@ -6,7 +6,11 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#include "base/common.h"
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include <ascc/ascc.h>
 
 /* A sequence as inspect reads it. */
 typedef struct inspect_input {

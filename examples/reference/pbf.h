@@ -2,7 +2,11 @@
 #ifndef REFERENCE_PBF_H
 #define REFERENCE_PBF_H
 
-#include "base/common.h"
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include <ascc/ascc.h>
 
 typedef struct pbf pbf;
 

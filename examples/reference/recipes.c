@@ -1,6 +1,8 @@
 /* Random scenes to generate data from. SPDX-License-Identifier: MIT */
 #include "recipes.h"
 
+#include "base/common.h"
+
 #include <math.h>
 #include <stdarg.h>
 #include <stdio.h>

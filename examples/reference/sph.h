@@ -7,7 +7,11 @@
 #ifndef REFERENCE_SPH_H
 #define REFERENCE_SPH_H
 
-#include "base/common.h"
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include <ascc/ascc.h>
 
 typedef struct sph sph;
 

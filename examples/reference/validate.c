@@ -9,6 +9,7 @@
 
 #include "inspect.h"
 #include "pbf.h"
+#include "base/common.h"
 #include "recipes.h"
 
 #define PI 3.14159265358979323846
