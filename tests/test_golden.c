@@ -579,7 +579,7 @@ static double rollout_difference(const network_case *n, const ascc_particles *p,
     return difference;
 }
 
-/* bounds: after 1, 2, 5, 10, 20 steps; a few times what float32 costs the reference (SEMANTICS 8). */
+/* bounds: after 1, 2, 5, 10, 20 steps; a few times what float32 costs the reference. */
 static void check_rollout(const char *model, const char *scene, bool weightless, int last,
                           const double bounds[5])
 {

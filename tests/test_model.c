@@ -198,7 +198,7 @@ static void demonstration_models_are_antisymmetric_and_radial(void **state)
     assert_null(model_builder_demo(2, 0.0, &size));
 }
 
-/* Half along `axis`, written out as SEMANTICS section 3 does for y. */
+/* Half along `axis`, written out. */
 static void halves_are_mirrored_along_each_axis(void **state)
 {
     (void)state;

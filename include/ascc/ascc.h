@@ -370,8 +370,8 @@ ASCC_API ascc_status ascc_particles_get_momentum(const ascc_particles *particles
                                                  size_t count, int64_t *momentum);
 
 /**
- * Total momentum of the fluid in quanta, exact; total[2] is 0 in 2D (METHOD section 4; without
- * gravity and walls it never changes). errors: ARGUMENT, RANGE (the sum does not fit).
+ * Total momentum of the fluid in quanta, exact; total[2] is 0 in 2D (docs/method.md, "Momentum
+ * to the bit": without gravity and walls it never changes). errors: ARGUMENT, RANGE (the sum does not fit).
  */
 ASCC_API ascc_status ascc_particles_total_momentum(const ascc_particles *particles,
                                                    int64_t total[3]);
@@ -439,7 +439,7 @@ typedef struct ascc_measures {
 } ascc_measures;
 
 /**
- * Measures the set (METHOD section 9). errors: ARGUMENT, MEMORY, RANGE; on error measures are
+ * Measures the set (docs/measures.md). errors: ARGUMENT, MEMORY, RANGE; on error measures are
  * untouched. cost: one neighbour search. threads: one at a time, since it leaves its message in the set.
  */
 ASCC_API ascc_status ascc_particles_measure(ascc_particles *particles, ascc_measures *measures);
@@ -450,12 +450,13 @@ typedef struct ascc_step ascc_step;
 
 /** Options of ascc_step_create. */
 typedef struct ascc_step_options {
-    size_t size;        /* sizeof(ascc_step_options) */
-    double time_step;   /* s; 0 = the model's. A longer one than the model was trained for is cut into
+    size_t size;      /* sizeof(ascc_step_options) */
+    double time_step; /* s; 0 = the model's. A longer one than the model was trained for is cut into
                          * equal substeps; with a shorter one than the model's the learned velocity
                          * correction is scaled by time_step / the model's, as an acceleration would be. */
     double length_unit; /* metres in one unit of the host's length; 0 = 1. 0.01 for centimetres */
-    double max_displacement; /* length unit a particle may move in a (sub)step, else RANGE; 0 = 64 of the
+    double
+        max_displacement; /* length unit a particle may move in a (sub)step, else RANGE; 0 = 64 of the
                               * model's spacings, INFINITY = no bound */
     int32_t max_neighbors; /* most neighbours of one point before LIMIT is returned; 0 = 4096 */
     int32_t reserved;
@@ -493,7 +494,7 @@ typedef struct ascc_forces {
 } ascc_forces;
 
 /**
- * Advances the fluid by `count` time steps (METHOD section 1). Walls do not move.
+ * Advances the fluid by `count` time steps (docs/method.md). Walls do not move.
  *
  * forces    NULL = the model's gravity alone.
  * errors    ARGUMENT, MISMATCH (dimension; a spacing that is not the model's), MEMORY (scratch had to
@@ -519,11 +520,11 @@ typedef struct ascc_stage_time {
 
 /** What ascc_step_get_statistics tells of the last ascc_step_run. */
 typedef struct ascc_step_statistics {
-    size_t size;         /* sizeof(ascc_step_statistics) */
-    int32_t steps;       /* that succeeded in the last run */
-    int32_t level_count; /* entries used of level_points */
-    int32_t substeps;    /* that each step was cut into */
-    int32_t stage_count; /* entries used of stage */
+    size_t size;          /* sizeof(ascc_step_statistics) */
+    int32_t steps;        /* that succeeded in the last run */
+    int32_t level_count;  /* entries used of level_points */
+    int32_t substeps;     /* that each step was cut into */
+    int32_t stage_count;  /* entries used of stage */
     double seconds_total; /* wall clock, of the run */
     /* By stage, in order: "forces" (and advection), "sight" (features, sorting and sampling of the levels),
      * "search" (neighbour lists), "network" (all layers but the last), "pairs" (pair impulses), "advance"

@@ -70,8 +70,8 @@ static inline float octant(float v)
     return v * p;
 }
 
-/* Volume preserving map of the unit ball to the cube: ball to cylinder, cylinder to cube (SEMANTICS
- * section 2). In place. */
+/* Volume preserving map of the unit ball to the cube: ball to cylinder, cylinder to cube
+ * (docs/method.md). In place. */
 static void map_volume(float *RESTRICT px, float *RESTRICT py, float *RESTRICT pz, size_t k)
 {
     for (size_t i = 0; i < k; i++) {

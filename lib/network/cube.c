@@ -79,7 +79,7 @@ static void map_radial(dual at[3])
         at[c] = product(at[c], s);
 }
 
-/* Ball to cylinder, cylinder to cube (SEMANTICS section 2). */
+/* Ball to cylinder, cylinder to cube (docs/method.md). */
 static void map_volume(dual at[3])
 {
     const dual h2 = linear(product(at[0], at[0]), 1.0, product(at[1], at[1]), 1.0);

@@ -1,4 +1,4 @@
-/* Measures of a particle set: energy, momenta, density, distances (METHOD section 9).
+/* Measures of a particle set: energy, momenta, density, distances.
  * SPDX-License-Identifier: MIT */
 #include <math.h>
 #include <string.h>

@@ -14,7 +14,7 @@ ascc_status ascc_sample_centers(ascc_points *samples, const ascc_search_tools *t
                                 const ascc_points *points, int32_t dimension, double voxel);
 
 /* Corners of the voxels that hold x - hysteresis or x + hysteresis (voxels, on all axes at once) of a
- * point x; the grid hangs on `anchor` (SEMANTICS section 4). errors: MEMORY, RANGE. */
+ * point x; the grid hangs on `anchor` (docs/method.md). errors: MEMORY, RANGE. */
 ascc_status ascc_sample_corners(ascc_points *samples, const ascc_search_tools *tools,
                                 const ascc_points *points, int32_t dimension, double voxel,
                                 double hysteresis, const double anchor[3]);

@@ -1,4 +1,4 @@
-/* Iterations: draws rollouts, adds up their gradients in order, and moves the weights (METHOD section 8).
+/* Iterations: draws rollouts, adds up their gradients in order, and moves the weights.
  * SPDX-License-Identifier: MIT */
 #include "trainer.h"
 

@@ -274,7 +274,7 @@ static void basis_factors(const ascc_filter *filter, int dimension, const double
                 bump_at(filter->bumps, k, rho) * (dimension == 2 ? flat : full)[m];
 }
 
-/* SEMANTICS section 2, steps 2 and 3: ball to cylinder, cylinder to cube. */
+/* Ball to cylinder, cylinder to cube (docs/method.md). */
 static void map_volume(double p[3])
 {
     const double pi = acos(-1.0);
