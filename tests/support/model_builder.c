@@ -450,7 +450,8 @@ static void add_trunk_layer(random_network *n, int layer)
             snprintf(source, sizeof source, "l%d.%d", layer - 1, d);
             add_dense(n, name, source, 1, 0, c, width);
             if (width == c)
-                model_text_add(&n->text, ",{\"type\":\"identity\",\"source\":\"%s\"}", source);
+                model_text_add(&n->text, ",{%s,\"source\":\"%s\"}",
+                               n->o.residual ? n->o.residual : "\"type\":\"identity\"", source);
         }
         model_text_add(&n->text, "]}");
     }

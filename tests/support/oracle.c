@@ -613,6 +613,8 @@ static void add_term(const network_state *n, const ascc_layer *layer, const ascc
             in[a] = read_value(n, term->source, term->rectify != 0, from, a);
         if (term->operation == &ascc_op_dense)
             add_product(n, term, 0, in, out);
+        else if (term->operation != &ascc_op_identity)
+            n->o->add_other(term, in, out);
         for (int32_t a = 0; term->operation == &ascc_op_identity && a < term->inputs; a++)
             out[a] += in[a];
         free(in);
