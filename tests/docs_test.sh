@@ -25,7 +25,7 @@ for page in README.md docs/getting-started.md; do
     fi
 done
 # What a newcomer copies is short, and is in a file that the tests build and run.
-for pair in docs/measures.md:tests/test_eval.c docs/stability.md:bench/stability/scenes.c; do
+for pair in docs/measures.md:tests/test_eval.c docs/stability.md:bench/stability/scenes.c docs/contributing.md:tests/op_scale.c; do
     number=$((number + 1))
     page=${pair%%:*}
     sed -n '/^```c$/,/^```$/p' "$page" | grep -v '^```' >"$folder/shown"
