@@ -8,6 +8,7 @@
 #include <string.h>
 
 #include "bench.h"
+#include "model/plan.h"
 
 #ifdef BENCH_HAVE_OPENBLAS
 #include <cblas.h>

@@ -15,6 +15,7 @@
 #include "../tests/support/model_builder.h"
 #include "bench.h"
 #include "model/model.h"
+#include "network/network.h"
 #include "network/operations.h"
 
 typedef struct subject {
@@ -322,12 +323,13 @@ static void step_row(const bench_options *b, bench_table *table, const subject_o
     char stages[256] = "";
     for (size_t p = 1, at = 0; p < PHASES; p++)
         at += (size_t)snprintf(stages + at, sizeof stages - at, "%.1f,", t.phase[p].median * ns);
-    bench_row(table, "%s,%s,%d,%zu,%zu,%s,%d,%.1f,%.1f,%.1f,%s%.2f,%.3f,%.1f,%.0f,%lld", o->scene,
-              o->model, s->info.dimension, s->count, s->walls, variant, o->threads,
+    bench_row(table, "%s,%s,%d,%zu,%zu,%s,%d,%.1f,%.1f,%.1f,%s%.2f,%.3f,%.1f,%.0f,%lld,%.0f",
+              o->scene, o->model, s->info.dimension, s->count, s->walls, variant, o->threads,
               t.phase[0].median * ns, t.phase[0].min * ns, t.phase[0].max * ns, stages,
               t.flops / t.phase[0].median * 1e-9, t.share.median,
               (double)s->last.neighbor_count / (double)s->count,
-              (double)s->last.scratch_size / (double)s->count, (long long)s->drift);
+              (double)s->last.scratch_size / (double)s->count, (long long)s->drift,
+              s->info.time_step / t.phase[0].median * (double)s->count);
     close_subject(s);
     free(s);
 }
@@ -335,9 +337,10 @@ static void step_row(const bench_options *b, bench_table *table, const subject_o
 static const char step_columns[] =
     "scene,model,dimension,particles,walls,variant,threads,ns_per_particle,min,max,forces,"
     "sight,search,network,pairs,advance,contact,commit,gflops,peak_share,neighbours_per_particle,"
-    "scratch_bytes_per_particle,momentum_drift_quanta";
+    "scratch_bytes_per_particle,momentum_drift_quanta,real_time_particles";
 static const char step_note[] =
-    "ns per particle by phase; CPU time on one thread, wall-clock on more; drift is exact";
+    "ns per particle by phase; CPU time on one thread, wall-clock on more; drift is exact; "
+    "real_time_particles: as many at this time each take the model's time step";
 
 static const bench_isa *best_isa(const bench_options *o)
 {

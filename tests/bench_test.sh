@@ -26,19 +26,21 @@ report() {
 
 run() { timeout 60 "$bench" "$@" --quick --output results --figures none >out 2>&1; }
 
-# Column COLUMN of every row whose first field starts with PREFIX: all must satisfy the awk TEST of x.
-column() { awk -F, -v p="$2" -v c="$3" 'index($1, p) == 1 { x = $c; n++; if (!('"$4"')) bad = 1 }
+# column TABLE PREFIX NAME TEST: the column NAME of every row whose first field starts with PREFIX satisfies
+# the awk TEST of x.
+column() { awk -F, -v p="$2" -v name="$3" '!/^#/ && !c { for (i = 1; i <= NF; i++) if ($i == name) c = i; next }
+    index($1, p) == 1 { x = $c; n++; if (!c || !('"$4"')) bad = 1 }
     END { exit bad || !n }' results/*/"$1".csv; }
 
 run kernel --only search --particles 1000
 report $? "the search is timed"
-column kernel search 5 'x > 0'
+column kernel search ns_per_particle 'x > 0'
 report $? "and written as a CSV row for each instruction set"
 grep -q '^# cpu: .*' results/*/kernel.csv && grep -q 'load average' results/*/kernel.csv
 report $? "under a header that names the machine and its load"
-run kernel --only 'layer 8' --particles 1000 && column kernel layer 10 'x > 0 && x < 1'
+run kernel --only 'layer 8' --particles 1000 && column kernel layer peak_share 'x > 0 && x < 1'
 report $? "a layer stays below the peak measured next to it"
-run step --scene dam-break --model tiny --particles 500 && column step dam-break 21 'x == 0'
+run step --scene dam-break --model tiny --particles 500 && column step dam-break momentum_drift_quanta 'x == 0'
 report $? "a step is timed, and its momentum is exact"
 run step --model nowhere.safetensors
 [ $? -eq 1 ] && grep -q 'nowhere.safetensors' out
