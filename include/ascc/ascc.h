@@ -533,8 +533,8 @@ typedef struct ascc_step_statistics {
     /* Of the last step: */
     uint64_t level_points[16]; /* points on each level; level 0: fluid and the walls it sees */
     uint64_t pair_count;       /* neighbour pairs of the last layer, unordered */
-    uint64_t neighbor_count;   /* entries of all neighbour rows */
-    uint64_t max_neighbors;    /* of one point in one row */
+    uint64_t neighbor_count;   /* entries of all neighbour lists */
+    uint64_t max_neighbors;    /* of one point in one list */
     uint64_t scratch_size;     /* bytes the step holds */
     /* Of the run, quanta of momentum, exact; [2] is 0 in 2D. before + external - wall = after, if the
      * model conserves momentum; else the difference is what its last layer made or lost. */

@@ -271,7 +271,7 @@ static void gather(const ascc_pairs *pairs, const float *window, const uint32_t 
     }
 }
 
-/* The bump of this number, of so many, at eight distances. */
+/* The radial basis function of this number, of so many, at eight distances. */
 static inline vector bump_at(vector distance, vector bumps, vector number)
 {
     const vector t = minus(times(bumps, distance), number);

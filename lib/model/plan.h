@@ -21,7 +21,7 @@
 #define ASCC_MAX_LAYERS 256
 #define ASCC_MAX_TERMS 2048
 #define ASCC_MAX_CELLS 4096 /* of one kernel */
-#define ASCC_MAX_BUMPS 8    /* of a radial basis */
+#define ASCC_MAX_BUMPS 8    /* functions of a radial basis */
 #define ASCC_MAX_ORDER 2
 #define ASCC_MAX_FEATURES 8
 #define ASCC_PLAN_MIN 1e-15 /* smallest and largest length, time or density a file may state */

@@ -1,12 +1,13 @@
-/* What convolutions and transfers have in common: a column of numbers gathered from the neighbours of a
+/* What convolutions, restriction and prolongation have in common: a column of numbers gathered from the neighbours of a
  * row, times a matrix. SPDX-License-Identifier: MIT */
 #ifndef ASCC_COLUMN_H
 #define ASCC_COLUMN_H
 
 #include "matrix.h"
 
-/* Options. Of a convolution: the feature motion is taken relative to the query's own. Of a transfer: hats are
- * divided by their sum; they are 0 this far away along any axis, m. */
+/* Options. Of a convolution: the feature motion is taken relative to the query's own, which is Galilean
+ * invariant. Of restriction and prolongation: hats are divided by their sum; they are 0 this far away along
+ * any axis, m. */
 enum { ASCC_OPTION_RELATIVE = 0, ASCC_OPTION_NORMALIZE = 1, ASCC_OPTION_VOXEL = 2 };
 
 static inline bool ascc_term_is_relative(const ascc_term *term)

@@ -71,14 +71,14 @@ void ascc_matrix_keep_column(const ascc_reverse *pass, const ascc_term *term, si
 {
     const size_t length = ascc_matrix_length(term);
     for (size_t i = 0; i < length; i++)
-        pass->turned[i * ASCC_TILE_ROWS + r] = pass->column[i];
+        pass->columns[i * ASCC_TILE_ROWS + r] = pass->column[i];
 }
 
 void ascc_matrix_back_weights(const ascc_reverse *pass, const ascc_term *term, size_t n)
 {
     const size_t b = ascc_padded(term->outputs), length = ascc_matrix_length(term);
     float *to = ascc_reverse_packed(pass, term);
-    pass->run->tools->kernels->multiply(pass->turned, ASCC_TILE_ROWS, length, n, pass->tile, b, to,
+    pass->run->tools->kernels->multiply(pass->columns, ASCC_TILE_ROWS, length, n, pass->tile, b, to,
                                         b);
     for (size_t r = 0; term->tensor[ASCC_TENSOR_BIAS] && r < n; r++)
         for (int32_t c = 0; c < term->outputs; c++)

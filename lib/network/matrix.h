@@ -27,7 +27,7 @@ void ascc_matrix_transpose(const ascc_plan *plan, const ascc_term *term, const f
 /* Adds the bias to the term's columns of a row. */
 void ascc_matrix_add_bias(const ascc_network_run *run, const ascc_term *term, float *row);
 
-/* pass->column_gradient[n][length] = the term's tile of gradients times the matrix, turned over. */
+/* d(column) = d(out) W^T for the tile: pass->column_gradient[n][length]. */
 void ascc_matrix_back(const ascc_reverse *pass, const ascc_term *term, size_t n);
 /* Row r of the tile read pass->column: keeps it for the next call. */
 void ascc_matrix_keep_column(const ascc_reverse *pass, const ascc_term *term, size_t r);

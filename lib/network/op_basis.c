@@ -1,4 +1,4 @@
-/* A continuous convolution in a small basis: radial bumps times harmonics of the direction
+/* A continuous convolution in a small basis: a radial basis times harmonics of the direction
  * (docs/file-format.md). SPDX-License-Identifier: MIT */
 #include <math.h>
 #include <string.h>
@@ -20,7 +20,7 @@ static ascc_status check(ascc_plan_builder *builder, const ascc_layer *layer,
     return ascc_convolution_check(builder, layer, entry, name, 4, ascc_filter_check_basis);
 }
 
-/* Two bumps reach a neighbour, beyond the last bump's centre one. */
+/* Two radial functions reach a neighbour, beyond the last one's centre one. */
 static double cost(const ascc_plan *plan, const ascc_cost_counts *counts, int32_t set,
                    const ascc_term *term)
 {
@@ -94,7 +94,7 @@ static void place_pair(const ascc_reverse *pass, const ascc_filter *filter,
     double by[9][3], by_rho = 0.0, by_u[3] = {0.0, 0.0, 0.0}, along = 0.0, u[3];
     g[0] = g[1] = g[2] = 0.0;
     if (distance == 0.0)
-        return; /* the centre: bumps are flat there, and there is no direction */
+        return; /* the centre: radial functions are flat there, and there is no direction */
     for (int c = 0; c < 3; c++)
         u[c] = r[c] / distance;
     harmonics_at(u, harmonics, by);

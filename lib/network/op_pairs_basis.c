@@ -1,8 +1,8 @@
 /* An antisymmetric output in a radial basis: pairs pushed and damped along the line between them, and
  * walls likewise (docs/file-format.md). SPDX-License-Identifier: MIT
  *
- * The strength of a pair is linear in what the two particles hold, so each particle is multiplied with all
- * bumps once, and a pair costs its bumps. Packed: a part for each tensor, [padded inputs][8 bumps].
+ * The strength of a pair is linear in what the two particles hold, so each particle is multiplied with the
+ * weights of all radial basis functions (`bumps`) once, and a pair costs the two that reach it. Packed: a part for each tensor, [padded inputs][8 bumps].
  */
 #include <math.h>
 #include <string.h>
@@ -172,7 +172,7 @@ static void scratch(const ascc_plan *plan, const ascc_term *term, ascc_scratch_s
         sizes->column += 3 * sizeof(double);
 }
 
-/* ---- Coefficients: what each particle gives each bump ---- */
+/* ---- Coefficients: what each particle gives each radial basis function ---- */
 
 typedef struct coefficients {
     const ascc_network_run *run;
@@ -240,7 +240,7 @@ static bool find_places(coefficients *c, const ascc_pair_sum *sum)
 
 /* ---- Pairs ---- */
 
-/* What the bumps make of a pair. */
+/* What the radial basis makes of a pair. */
 typedef struct strengths {
     float strength[ASCC_PAIR_BATCH]; /* along the line from the row to the neighbour */
     float damping[ASCC_PAIR_BATCH];
@@ -378,7 +378,7 @@ typedef struct gradients {
     float *part[PARTS]; /* [row][8] */
 } gradients;
 
-/* The two bumps that a distance lies in. */
+/* The two radial basis functions that reach a distance. */
 typedef struct bumps_at {
     size_t first, count;
     double value[2], slope[2]; /* slope: by rho */
@@ -446,19 +446,19 @@ static void pass_places(const ascc_pair_reverse *q, const pair *a, const ascc_fi
     const double by_cosine = a->along * a->strength;
     const double by_rho =
         a->along * (a->cosine * a->slope - a->damping_slope * a->approach) / filter->radius;
-    double by_u[3], by_seen[3], seen_i[3], seen_j[3], turned = 0.0, seen_turned = 0.0;
+    double by_u[3], by_seen[3], seen_i[3], seen_j[3], radial = 0.0, seen_radial = 0.0;
     for (size_t c = 0; c < 3; c++) {
         by_u[c] = a->force[c] * a->total - a->damping * a->along * a->relative[c] +
                   (before ? by_cosine * a->seen[c] : 0.0);
         by_seen[c] = before ? by_cosine * a->u[c] : 0.0;
-        turned += by_u[c] * a->u[c];
-        seen_turned += by_seen[c] * a->seen[c];
+        radial += by_u[c] * a->u[c];
+        seen_radial += by_seen[c] * a->seen[c];
     }
     for (size_t c = 0; c < 3; c++) {
-        const double by_d = (by_u[c] - turned * a->u[c]) / a->length;
+        const double by_d = (by_u[c] - radial * a->u[c]) / a->length;
         seen_j[c] = by_rho * a->seen[c] + (before ? 0.0 : by_d);
         if (a->distance > 0.0)
-            seen_j[c] += (by_seen[c] - seen_turned * a->seen[c]) / a->distance;
+            seen_j[c] += (by_seen[c] - seen_radial * a->seen[c]) / a->distance;
         seen_i[c] = -seen_j[c];
         if (before && c < n) {
             p->pass->place[ascc_hierarchy_host_row(h, q->set, a->i) * n + c] -= by_d;

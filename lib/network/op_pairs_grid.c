@@ -176,7 +176,7 @@ static size_t fill_up(ascc_pair_batch *b)
     return count;
 }
 
-/* Terms turned to lie along the lines between the particles. */
+/* Terms projected on the lines between the particles. */
 static void make_central(const ascc_pair_sum *sum, size_t i, const ascc_pair_batch *b,
                          ascc_pair_impulses t)
 {
@@ -264,7 +264,7 @@ static ascc_status impulses(const ascc_network_run *run, const ascc_impulse_scal
 
 /* ---- The way back ---- */
 
-/* One pair: terms t = window * sum of trilinear weight * kernel . (f_i + f_j), turned along r if radial. */
+/* One pair: terms t = window * sum of trilinear weight * kernel . (f_i + f_j), projected on r if radial. */
 static void visit(const ascc_pair_reverse *q, size_t i, size_t j, const double r[3],
                   const double line[3])
 {

@@ -5,7 +5,7 @@
 
 #define TILE ASCC_TILE_ROWS
 
-/* ---- Weights turned over ---- */
+/* ---- Weights transposed ---- */
 
 bool ascc_transposed_create(ascc_transposed *transposed, const ascc_allocator *allocator,
                             const ascc_plan *plan, const ascc_packed *packed)
@@ -127,11 +127,11 @@ static ascc_status take_scratch(ascc_reverse *p, const ascc_layer *layer)
     p->scratch = ascc_arena_take(arena, sizes.scratch, sizeof(float));
     p->dot = ascc_arena_take(arena, sizes.reverse, sizeof(float));
     p->column = ascc_arena_take(arena, sizes.column, sizeof(float));
-    p->turned = ascc_arena_take(arena, sizes.column * TILE, sizeof(float));
+    p->columns = ascc_arena_take(arena, sizes.column * TILE, sizeof(float));
     p->column_gradient = ascc_arena_take(arena, sizes.column * TILE, sizeof(float));
     p->tile = ascc_arena_take(arena, outputs * TILE, sizeof(float));
     p->joined = ascc_arena_take(arena, ascc_padded(layer->channels) * TILE, sizeof(float));
-    if (!sequence || !p->scratch || !p->dot || !p->column || !p->turned || !p->column_gradient ||
+    if (!sequence || !p->scratch || !p->dot || !p->column || !p->columns || !p->column_gradient ||
         !p->tile || !p->joined)
         return ASCC_ERROR_MEMORY;
     for (size_t i = 0; i < sizes.room; i++)

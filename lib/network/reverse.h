@@ -10,7 +10,7 @@
 
 #include "network.h"
 
-/* Packed weights once more, turned over by their operations: what gradients of columns are made with. */
+/* Packed weights once more, transposed by their operations: d(column) = d(out) W^T. */
 typedef struct ascc_transposed {
     float *block; /* laid out as the packed block */
     size_t count;
@@ -54,7 +54,7 @@ typedef struct ascc_reverse {
     float *tile;            /* [tile][padded outputs of a term] gradient */
     float *column;          /* of one row */
     float *column_gradient; /* [tile][column] */
-    float *turned;          /* [column][tile] */
+    float *columns;         /* [column][tile]: the tile's columns, transposed */
     float *scratch;         /* as the operation asked for forwards ... */
     float *dot;             /* ... and for the way back */
     size_t room;
@@ -69,7 +69,7 @@ static inline float *ascc_reverse_source(const ascc_reverse *pass, const ascc_te
     return term->rectify ? value->rectified : value->raw;
 }
 
-/* Where a term's packed weights have their gradient, and where they stand turned over. */
+/* Where a term's packed weights have their gradient, and where they stand transposed. */
 static inline size_t ascc_reverse_offset(const ascc_reverse *pass, const ascc_term *term)
 {
     return (size_t)(ascc_term_packed(pass->run, term) - pass->run->network->packed->block);
