@@ -1,5 +1,5 @@
-/* What convolutions, restriction and prolongation have in common: a column of numbers gathered from the neighbours of a
- * row, times a matrix. SPDX-License-Identifier: MIT */
+/* What convolutions, restriction and prolongation have in common: a column of numbers gathered from the
+ * neighbours of a row, times a matrix. SPDX-License-Identifier: MIT */
 #ifndef ASCC_COLUMN_H
 #define ASCC_COLUMN_H
 

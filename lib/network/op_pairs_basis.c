@@ -2,7 +2,8 @@
  * walls likewise (docs/file-format.md). SPDX-License-Identifier: MIT
  *
  * The strength of a pair is linear in what the two particles hold, so each particle is multiplied with the
- * weights of all radial basis functions (`bumps`) once, and a pair costs the two that reach it. Packed: a part for each tensor, [padded inputs][8 bumps].
+ * weights of all radial basis functions (`bumps`) once, and a pair costs the two that reach it.
+ * Packed: a part for each tensor, [padded inputs][8 bumps].
  */
 #include <math.h>
 #include <string.h>
