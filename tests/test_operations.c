@@ -180,7 +180,7 @@ static void add_scaled(const ascc_term *term, const double *in, double *out)
 
 typedef struct recipe {
     const char *operation; /* its name */
-    int variants;          /* even ones are 2D, odd ones 3D */
+    int variants;          /* even ones are 2D, odd ones 3D; 0: its own test is elsewhere */
     void (*make)(int variant, model_random *random);
     /* What it does, where the oracle does not know it. */
     void (*add)(const ascc_term *term, const double *in, double *out);

@@ -180,7 +180,8 @@ static void read_term(ascc_plan_builder *builder, ascc_reader *reader, uint32_t 
     term.source = read_source(builder, reader, object);
     term.rectify = ascc_reader_optional_flag(reader, object, "relu");
     term.column = ascc_reader_optional_integer(reader, object, "column");
-    term.operation->read(reader, object, &builder->plan, &term, name);
+    if (term.operation->read)
+        term.operation->read(reader, object, &builder->plan, &term, name);
     ascc_reader_end(reader, object);
     if (reader->status == ASCC_OK)
         reader->status = ascc_plan_add_term(builder, &term, name);
@@ -255,7 +256,8 @@ static void read_output(ascc_plan_builder *builder, ascc_reader *reader)
     output.term.source = read_source(builder, reader, object);
     output.term.rectify = ascc_reader_optional_flag(reader, object, "relu");
     read_scale(reader, object, builder->plan.dimension, output.scale);
-    output.term.operation->read(reader, object, &builder->plan, &output.term, name);
+    if (output.term.operation->read)
+        output.term.operation->read(reader, object, &builder->plan, &output.term, name);
     ascc_reader_end(reader, object);
     if (reader->status == ASCC_OK)
         reader->status = ascc_plan_set_output(builder, &output, name);

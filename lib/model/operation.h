@@ -47,7 +47,7 @@ typedef struct ascc_operation {
 
     /* ---- From a file ---- */
 
-    /* Takes its own members out of the description, and the names of its tensors. */
+    /* Takes its own members out of the description, and the names of its tensors. NULL = it has none. */
     void (*read)(ascc_reader *reader, uint32_t object, const ascc_plan *plan, ascc_term *term,
                  const char *name[ASCC_MAX_TENSORS]);
     /* Finds tensors, outputs and filter, and refuses what does not fit. layer: NULL of an output. */

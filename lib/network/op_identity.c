@@ -3,16 +3,6 @@
 #include "network.h"
 #include "reverse.h"
 
-static void read_nothing(ascc_reader *reader, uint32_t object, const ascc_plan *plan,
-                         ascc_term *term, const char *name[ASCC_MAX_TENSORS])
-{
-    (void)reader;
-    (void)object;
-    (void)plan;
-    (void)term;
-    (void)name;
-}
-
 static ascc_status check(ascc_plan_builder *builder, const ascc_layer *layer,
                          ascc_term_entry *entry, const char *const name[ASCC_MAX_TENSORS])
 {
@@ -50,7 +40,6 @@ static void backward(const ascc_reverse *pass, const ascc_layer *layer, const as
 
 const ascc_operation ascc_op_identity = {.name = "identity",
                                          .type = "identity",
-                                         .read = read_nothing,
                                          .check = check,
                                          .forward = forward,
                                          .backward = backward};

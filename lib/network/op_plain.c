@@ -3,16 +3,6 @@
 #include "pair_reverse.h"
 #include "pair_sum.h"
 
-static void read_plain(ascc_reader *reader, uint32_t object, const ascc_plan *plan, ascc_term *term,
-                       const char *name[ASCC_MAX_TENSORS])
-{
-    (void)reader;
-    (void)object;
-    (void)plan;
-    (void)term;
-    (void)name;
-}
-
 static ascc_status check(ascc_plan_builder *builder, const ascc_layer *layer,
                          ascc_term_entry *entry, const char *const name[ASCC_MAX_TENSORS])
 {
@@ -61,7 +51,6 @@ static ascc_status backward(ascc_reverse *pass)
 
 const ascc_operation ascc_op_plain = {.name = "plain output",
                                       .type = "plain",
-                                      .read = read_plain,
                                       .check = check,
                                       .impulses = impulses,
                                       .backward_output = backward};
