@@ -66,7 +66,8 @@ static void read_levels(ascc_reader *reader, uint32_t root, ascc_plan *plan)
     if (plan->sampling == ASCC_SAMPLING_CORNERS)
         plan->hysteresis = ascc_reader_number(reader, sampling, "hysteresis", 0.0, 0.5);
     if (ascc_reader_has(reader, sampling, "points"))
-        plan->fluid_sampled = ascc_reader_choice(reader, sampling, "points", sampled, COUNT(sampled));
+        plan->fluid_sampled =
+            ascc_reader_choice(reader, sampling, "points", sampled, COUNT(sampled));
     ascc_reader_end(reader, sampling);
 
     ascc_reader_where(reader, "network 'levels'");

@@ -76,7 +76,8 @@ typedef struct ascc_term {
     int32_t column;  /* first column of the layer it adds to */
     int32_t inputs;  /* channels of the source */
     int32_t outputs; /* columns it adds to; column + outputs <= layer's channels */
-    int32_t gathered; /* numbers of one cell of a column: the inputs, unless the operation says otherwise */
+    int32_t
+        gathered; /* numbers of one cell of a column: the inputs, unless the operation says otherwise */
     const float *tensor[ASCC_MAX_TENSORS]; /* as in the file; which is which, the operation says */
     double option[4];                      /* the operation's own */
     ascc_filter filter;
@@ -158,9 +159,9 @@ typedef struct ascc_plan {
     int32_t level_count;
     ascc_sampling sampling;
     int32_t
-        centroid_anchor;   /* voxel grids hang on the mean of level 0 instead of the world's origin */
+        centroid_anchor; /* voxel grids hang on the mean of level 0 instead of the world's origin */
     int32_t fluid_sampled; /* levels have points where fluid is, not where walls are */
-    double hysteresis; /* of ASCC_SAMPLING_CORNERS, in voxels */
+    double hysteresis;     /* of ASCC_SAMPLING_CORNERS, in voxels */
     ascc_level level[ASCC_MAX_LEVELS];
     int32_t layer_count, term_count;
     ascc_layer *layer;

@@ -91,8 +91,8 @@ static ascc_status check(ascc_plan_builder *builder, const ascc_layer *layer,
     status = ascc_plan_check_inputs(builder, tensor, tap_inputs(plan, term), &term->outputs);
     term->gathered = (int32_t)taps_of(plan) * tap_inputs(plan, term);
     const double voxel = voxel_of(plan, layer->set);
-    term->filter = (ascc_filter){.cells = {1, 1, 1},
-                                 .radius = voxel * fmax(1.5, sqrt(plan->dimension))};
+    term->filter =
+        (ascc_filter){.cells = {1, 1, 1}, .radius = voxel * fmax(1.5, sqrt(plan->dimension))};
     return status == ASCC_OK ? ascc_plan_check_bias(builder, entry, name[ASCC_TENSOR_BIAS])
                              : status;
 }
