@@ -758,7 +758,7 @@ static void wrong_bases_and_transfers_are_refused_by_name(void **state)
          "[{\"ratio\":0.5}],\"sampling\":{\"method\":\"farthest\"}", "'farthest'"},
         {"\"normalize\":true", "\"normalize\":1", "'normalize'"},
         {"\"normalize\":true", "\"radius\":1", "'radius'"},
-        {"\"weight\":\"w\",", "", "'weight'"},
+        {"\"weight\":\"w\",", "", "'w' is not used"},
         {"\"weight\":\"w\"", "\"weight\":\"k\"", "dimensions"},
         {"\"bumps\":4", "\"bumps\":4,\"order\":1", "'order'"},
         {"\"bumps\":4", "\"bumps\":3", "[4, 2], but must have [3, 2]"},
