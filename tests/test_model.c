@@ -596,6 +596,23 @@ static void base_network_loads(void **state)
     ascc_model_destroy(&model);
 }
 
+static void cells_and_outputs_that_agree_with_the_tensors_load(void **state)
+{
+    (void)state;
+    size_t size;
+    char *cells = replaced(base_network, "\"kernel\":\"k\"",
+                           "\"kernel\":\"k\",\"cells\":[3,3,1],\"outputs\":2");
+    char *network = replaced(cells, "\"stored\":\"full\"",
+                             "\"stored\":\"half\",\"half_axis\":\"y\",\"cells\":[4,8,1]");
+    unsigned char *bytes = build(network, NULL, 0, NULL, &size);
+    ascc_model *model = must_load(bytes, size);
+    check_plan(model);
+    assert_int_equal(model->plan.output.term.filter.cells[1], 8);
+    ascc_model_destroy(&model);
+    free(network);
+    free(cells);
+}
+
 static void wrong_descriptions_are_refused_by_name(void **state)
 {
     (void)state;
@@ -630,7 +647,8 @@ static void wrong_descriptions_are_refused_by_name(void **state)
         {"[\"one\",\"velocity\"]", "[\"one\",\"colour\"]", "'colour'"},
         {"[\"one\",\"velocity\"]", "[\"one\",1]", "fluid"},
         {"[\"one\",\"velocity\"]", "[]", "channels"},
-        {"[\"one\",\"velocity\"]", "[\"one\"]", "'k' takes 3 channels, but its source has 1"},
+        {"[\"one\",\"velocity\"]", "[\"one\"]",
+         "'k' has the shape [1, 3, 3, 3, 2], but must have [1, 3, 3, 1, 2]"},
         {"[\"one\",\"normal\"]", "[\"one\",\"velocity\"]", "boundary"},
         {"\"boundary\":[\"one\",\"normal\"]", "\"wall\":[]", "'boundary'"},
         /* Levels and sampling. */
@@ -662,7 +680,7 @@ static void wrong_descriptions_are_refused_by_name(void **state)
         {"\"channels\":5", "\"channels\":4", "columns [2, 5)"},
         {"\"channels\":5", "\"channels\":0", "'channels'"},
         {"\"channels\":5", "\"channels\":1025", "'channels'"},
-        {"\"channels\":5", "\"channels\":6", "'k2' takes 5 channels, but its source has 6"},
+        {"\"channels\":5", "\"channels\":6", "but must have [1, 2, 2, 6, 2]: z, y, x, inputs"},
         {"\"channels\":2,\"terms\":[", "\"channels\":2,\"terms\":[],\"x\":[", "'x'"},
         /* Terms. */
         {"\"type\":\"convolution\"", "\"type\":\"attention\"", "'attention'"},
@@ -671,10 +689,10 @@ static void wrong_descriptions_are_refused_by_name(void **state)
         {"\"source\":\"a\",\"relu\"", "\"source\":\"b\",\"relu\"", "before"},
         {"\"source\":\"fluid\",\"kernel\"", "\"source\":\"air\",\"kernel\"", "'air'"},
         {"\"kernel\":\"k\"", "\"kernel\":\"none\"", "'none' is missing"},
-        {"\"kernel\":\"k\"", "\"kernel\":\"w\"", "dimensions"},
-        {"\"bias\":\"kb\"", "\"bias\":\"w\"", "dimensions"},
+        {"\"kernel\":\"k\"", "\"kernel\":\"w\"", "'w' has the shape [3, 3], but must"},
+        {"\"bias\":\"kb\"", "\"bias\":\"w\"", "'w' has the shape [3, 3], but must"},
         {"\"bias\":\"kb\",", "", "'kb' is not used"},
-        {"\"weight\":\"w\"", "\"weight\":\"w\",\"bias\":\"kb\"", "'kb' has 2 values"},
+        {"\"weight\":\"w\"", "\"weight\":\"w\",\"bias\":\"kb\"", "'kb' has the shape [2]"},
         {"\"weight\":\"w\"", "\"weight\":\"w\",\"radius\":1", "'radius'"},
         {"\"column\":2,\"relu\":true", "\"column\":3,\"relu\":true", "columns [3, 6)"},
         {"\"column\":2,\"relu\":true", "\"column\":-1,\"relu\":true", "'column'"},
@@ -686,7 +704,22 @@ static void wrong_descriptions_are_refused_by_name(void **state)
         {"\"mapping\":\"volume\"", "\"mapping\":\"sphere\"", "'sphere'"},
         {"\"neighbor_limit\":9", "\"neighbor_limit\":-9", "'neighbor_limit'"},
         {"\"skip_self\":false", "\"skip_self\":null", "'skip_self'"},
+        {"\"kernel\":\"k\"", "\"kernel\":\"k\",\"cells\":[3,4,1]",
+         "'k' has the shape [1, 3, 3, 3, 2], but must have [1, 4, 3, 3, 2]"},
+        {"\"kernel\":\"k\"", "\"kernel\":\"k\",\"cells\":[3,3]", "'cells'"},
+        {"\"kernel\":\"k\"", "\"kernel\":\"k\",\"cells\":[3,3,1.5]", "'cells'"},
+        {"\"kernel\":\"k\"", "\"kernel\":\"k\",\"cells\":[3,3,0]", "'cells'"},
+        {"\"kernel\":\"k\"", "\"kernel\":\"k\",\"outputs\":3",
+         "'k' has the shape [1, 3, 3, 3, 2], but must have [1, 3, 3, 3, 3]"},
+        {"\"kernel\":\"k\"", "\"kernel\":\"k\",\"outputs\":0", "'outputs'"},
+        {"\"weight\":\"w\"", "\"weight\":\"w\",\"outputs\":2", "'w' has the shape [3, 3]"},
+        {"\"weight\":\"w\"", "\"weight\":\"w\",\"cells\":[1,1,1]", "'cells'"},
+        {"\"column\":2,\"relu\":true", "\"column\":2,\"outputs\":2", "'outputs' is 2"},
         /* The output. */
+        {"\"stored\":\"full\"", "\"stored\":\"half\",\"half_axis\":\"y\",\"cells\":[4,9,1]",
+         "not even"},
+        {"\"stored\":\"full\"", "\"stored\":\"full\",\"cells\":[4,6,1]", "'o' has the shape"},
+        {"\"stored\":\"full\"", "\"stored\":\"full\",\"outputs\":2", "'outputs'"},
         {"\"output\":{", "\"outputs\":{", "'output'"},
         {"\"type\":\"antisymmetric\"", "\"type\":\"symmetric\"", "'symmetric'"},
         {"\"type\":\"antisymmetric\"", "\"type\":\"plain\"", "output"},
@@ -695,7 +728,7 @@ static void wrong_descriptions_are_refused_by_name(void **state)
          "'fluid'"},
         {"\"antisymmetric\",\"source\":\"a\"", "\"antisymmetric\",\"source\":\"c\"", "'c'"},
         {"\"antisymmetric\",\"source\":\"a\"", "\"antisymmetric\",\"source\":\"fluid\"",
-         "'o' takes 5 channels"},
+         "'o' has the shape"},
         {"\"stored\":\"full\"", "\"stored\":\"quarter\"", "'quarter'"},
         {"\"stored\":\"full\"", "\"stored\":\"half\"", "'half_axis'"},
         {"\"stored\":\"full\"", "\"stored\":\"full\",\"half_axis\":\"x\"", "'half_axis'"},
@@ -737,10 +770,10 @@ static void wrong_bases_and_transfers_are_refused_by_name(void **state)
     } cases[] = {
         {"\"bumps\":3", "\"bumps\":0", "'bumps'"},
         {"\"bumps\":3", "\"bumps\":9", "'bumps'"},
-        {"\"bumps\":3", "\"bumps\":2", "3 bumps and 3 harmonics, but its basis has 2 and 3"},
+        {"\"bumps\":3", "\"bumps\":2", "but must have [2, 3, 3, 2]: bumps, harmonics, inputs"},
         {"\"order\":1", "\"order\":3", "'order'"},
         {"\"order\":1", "\"order\":-1", "'order'"},
-        {"\"order\":1", "\"order\":2", "3 bumps and 3 harmonics, but its basis has 3 and 5"},
+        {"\"order\":1", "\"order\":2", "but must have [3, 5, 3, 2]: bumps, harmonics, inputs"},
         {",\"order\":1", "", "'order'"},
         {"\"order\":1", "\"order\":1,\"width\":2", "'width'"},
         {"{\"bumps\":3,\"order\":1}", "3", "'basis'"},
@@ -748,8 +781,9 @@ static void wrong_bases_and_transfers_are_refused_by_name(void **state)
         {"\"radius\":0.1,\"basis\"", "\"radius\":0.1,\"mapping\":\"volume\",\"basis\"",
          "'mapping'"},
         {",\"basis\":{\"bumps\":3,\"order\":1}", "", "'window'"},
-        {"\"kernel\":\"k\"", "\"kernel\":\"w\"", "dimensions"},
-        {"[\"one\",\"velocity\"]", "[\"velocity\"]", "'k' takes 3 channels"},
+        {"\"kernel\":\"k\"", "\"kernel\":\"w\"", "'w' has the shape [2, 2], but must"},
+        {"[\"one\",\"velocity\"]", "[\"velocity\"]",
+         "'k' has the shape [3, 3, 3, 2], but must have [3, 3, 2, 2]"},
         {"\"type\":\"transfer\"", "\"type\":\"dense\"", "'normalize'"},
         {"\"points\":\"level1\"", "\"points\":\"fluid\"", "transfer"},
         {"\"points\":\"level1\"", "\"points\":\"all\"", "transfer"},
@@ -759,7 +793,7 @@ static void wrong_bases_and_transfers_are_refused_by_name(void **state)
         {"\"normalize\":true", "\"normalize\":1", "'normalize'"},
         {"\"normalize\":true", "\"radius\":1", "'radius'"},
         {"\"weight\":\"w\",", "", "'w' is not used"},
-        {"\"weight\":\"w\"", "\"weight\":\"k\"", "dimensions"},
+        {"\"weight\":\"w\"", "\"weight\":\"k\"", "but must have [2, 3]: inputs, outputs"},
         {"\"bumps\":4", "\"bumps\":4,\"order\":1", "'order'"},
         {"\"bumps\":4", "\"bumps\":3", "[4, 2], but must have [3, 2]"},
         {"\"kernel\":\"o\"", "\"kernel\":\"k\"", "dimensions"},
@@ -912,18 +946,18 @@ static void wrong_tensors_are_refused_by_name(void **state)
         {"kb", 0, {0}, "'kb' is missing"},
         {"w", 0, {0}, "'w' is missing"},
         {"o", 0, {0}, "'o' is missing"},
-        {"k", 4, {3, 3, 3, 2}, "'k' has 4 dimensions"},
+        {"k", 4, {3, 3, 3, 2}, "'k' has the shape [3, 3, 3, 2], but must"},
         {"k", 5, {2, 3, 3, 3, 2}, "along z"},
-        {"k", 5, {1, 3, 3, 4, 2}, "'k' takes 4"},
-        {"k", 5, {1, 3, 3, 3, 4}, "'kb' has 2 values"},
-        {"k", 5, {1, 0, 3, 3, 2}, "cells"},
-        {"k", 5, {1, 3, 3, 3, 0}, "gives 0 channels"},
-        {"kb", 1, {3}, "'kb' has 3 values"},
+        {"k", 5, {1, 3, 3, 4, 2}, "'k' has the shape [1, 3, 3, 4, 2]"},
+        {"k", 5, {1, 3, 3, 3, 4}, "'kb' has the shape [2]"},
+        {"k", 5, {1, 0, 3, 3, 2}, "'k' has the shape [1, 0, 3"},
+        {"k", 5, {1, 3, 3, 3, 0}, "'k' has the shape [1, 3, 3, 3, 0]"},
+        {"kb", 1, {3}, "'kb' has the shape [3]"},
         {"w", 2, {3, 4}, "columns [2, 6)"},
-        {"w", 2, {2, 3}, "'w' takes 2"},
-        {"w", 1, {3}, "'w' has 1 dimensions"},
-        {"o", 5, {1, 4, 4, 5, 3}, "output: 3 channels"},
-        {"o", 5, {1, 4, 4, 4, 2}, "'o' takes 4"},
+        {"w", 2, {2, 3}, "'w' has the shape [2, 3]"},
+        {"w", 1, {3}, "'w' has the shape [3], but must"},
+        {"o", 5, {1, 4, 4, 5, 3}, "'o' has the shape [1, 4, 4, 5, 3]"},
+        {"o", 5, {1, 4, 4, 4, 2}, "'o' has the shape [1, 4, 4, 4, 2]"},
         {"o", 5, {1, 4, 4, 5, 2}, "'o' is not antisymmetric"},
         {"o", 5, {1, 3, 3, 5, 2}, "'o' is not antisymmetric"},
     };
@@ -1124,6 +1158,7 @@ int main(void)
         cmocka_unit_test(arguments_and_paths_are_checked),
         cmocka_unit_test(model_outlives_its_context),
         cmocka_unit_test(base_network_loads),
+        cmocka_unit_test(cells_and_outputs_that_agree_with_the_tensors_load),
         cmocka_unit_test(wrong_descriptions_are_refused_by_name),
         cmocka_unit_test(wrong_bases_and_transfers_are_refused_by_name),
         cmocka_unit_test(wrong_motions_dampings_and_walls_are_refused_by_name),

@@ -181,6 +181,8 @@ static void read_term(ascc_plan_builder *builder, ascc_reader *reader, uint32_t 
     term.source = read_source(builder, reader, object);
     term.rectify = ascc_reader_optional_flag(reader, object, "relu");
     term.column = ascc_reader_optional_integer(reader, object, "column");
+    if (ascc_reader_has(reader, object, "outputs"))
+        term.outputs = ascc_reader_integer(reader, object, "outputs", 1, ASCC_MAX_CHANNELS);
     if (term.operation->read)
         term.operation->read(reader, object, &builder->plan, &term, name);
     ascc_reader_end(reader, object);

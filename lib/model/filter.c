@@ -1,15 +1,24 @@
 /* The filters of convolutions, as filter.h draws them. SPDX-License-Identifier: MIT */
 #include "filter.h"
 
-#include <string.h>
-
-#define FAIL(...) ascc_fail(builder->message, ASCC_ERROR_FORMAT, __VA_ARGS__)
 #define COUNT(list) ((int32_t)(sizeof(list) / sizeof *(list)))
 
 static void read_common(ascc_reader *reader, uint32_t object, ascc_filter *filter)
 {
     filter->radius = ascc_reader_number(reader, object, "radius", ASCC_PLAN_MIN, ASCC_PLAN_MAX);
     filter->neighbor_limit = ascc_reader_optional_integer(reader, object, "neighbor_limit");
+}
+
+/* [x, y, z] of the whole kernel. */
+static void read_cells(ascc_reader *reader, uint32_t object, int32_t cells[3])
+{
+    double number[3] = {0.0, 0.0, 0.0};
+    ascc_reader_numbers(reader, object, "cells", 3, 1.0, ASCC_MAX_CELLS, number);
+    for (int axis = 0; axis < 3; axis++) {
+        cells[axis] = (int32_t)number[axis];
+        if ((double)cells[axis] != number[axis])
+            ascc_reader_fail(reader, "'cells' must be integers");
+    }
 }
 
 void ascc_filter_read_grid(ascc_reader *reader, uint32_t object, ascc_filter *filter)
@@ -21,9 +30,12 @@ void ascc_filter_read_grid(ascc_reader *reader, uint32_t object, ascc_filter *fi
         (ascc_window)ascc_reader_choice(reader, object, "window", windows, COUNT(windows));
     filter->mapping =
         (ascc_mapping)ascc_reader_choice(reader, object, "mapping", mappings, COUNT(mappings));
+    if (ascc_reader_has(reader, object, "cells"))
+        read_cells(reader, object, filter->cells);
 }
 
-void ascc_filter_read_basis(ascc_reader *reader, uint32_t object, ascc_filter *filter, bool central)
+void ascc_filter_read_basis(ascc_reader *reader, uint32_t object, int32_t dimension,
+                            ascc_filter *filter, bool central)
 {
     read_common(reader, object, filter);
     const uint32_t basis = ascc_reader_object(reader, object, "basis");
@@ -31,42 +43,26 @@ void ascc_filter_read_basis(ascc_reader *reader, uint32_t object, ascc_filter *f
     if (!central)
         filter->order = ascc_reader_integer(reader, basis, "order", 0, ASCC_MAX_ORDER);
     ascc_reader_end(reader, basis);
-}
-
-/* A basis as cells: harmonics, then bumps. */
-static void set_cells(ascc_filter *filter, int32_t harmonics)
-{
-    const int32_t cells[3] = {harmonics, filter->bumps, 1};
-    memcpy(filter->cells, cells, sizeof cells);
+    const int32_t order = filter->order;
+    filter->cells[0] = central ? 1 : dimension == 2 ? 2 * order + 1 : (order + 1) * (order + 1);
+    filter->cells[1] = filter->bumps;
+    filter->cells[2] = 1;
     filter->mapping = ASCC_MAPPING_DIRECTION;
     filter->window = ASCC_WINDOW_NONE;
 }
 
-ascc_status ascc_filter_check_basis(ascc_plan_builder *builder, const ascc_tensor *tensor,
-                                    ascc_filter *filter)
+void ascc_filter_want_grid(ascc_term *term, int32_t half_axis, const size_t *stored,
+                           ascc_tensor_wanted *wanted)
 {
-    const int32_t order = filter->order;
-    const int32_t harmonics =
-        builder->plan.dimension == 2 ? 2 * order + 1 : (order + 1) * (order + 1);
-    if (tensor->shape[0] != (size_t)filter->bumps || tensor->shape[1] != (size_t)harmonics)
-        return FAIL("tensor '%s' is for %zu bumps and %zu harmonics, but its basis has %d and %d",
-                    ascc_quote(tensor->name).text, tensor->shape[0], tensor->shape[1],
-                    (int)filter->bumps, (int)harmonics);
-    set_cells(filter, harmonics);
-    return ASCC_OK;
-}
-
-ascc_status ascc_filter_check_central(ascc_plan_builder *builder, int32_t inputs,
-                                      ascc_filter *filter, const char *name, int32_t *index)
-{
-    const ascc_status status = ascc_plan_find_tensor(builder, name, 2, index);
-    if (status != ASCC_OK)
-        return status;
-    const ascc_tensor *tensor = &builder->file->tensor[*index];
-    if (tensor->shape[0] != (size_t)filter->bumps || tensor->shape[1] != (size_t)inputs)
-        return FAIL("tensor '%s' has the shape [%zu, %zu], but must have [%d, %d]: bumps, channels",
-                    ascc_quote(tensor->name).text, tensor->shape[0], tensor->shape[1],
-                    (int)filter->bumps, (int)inputs);
-    set_cells(filter, 1);
-    return ASCC_OK;
+    *wanted = (ascc_tensor_wanted){.dimensions = "z, y, x, inputs, outputs", .rank = 5};
+    for (int axis = 0; axis < 3; axis++) {
+        int32_t *cells = &term->filter.cells[axis];
+        const int32_t parts = axis == half_axis ? 2 : 1;
+        if (*cells == 0 && stored[2 - axis] <= ASCC_MAX_CELLS)
+            *cells = parts * (int32_t)stored[2 - axis];
+        wanted->shape[2 - axis] = (size_t)(*cells / parts);
+    }
+    ascc_plan_take_outputs(term, stored[4]);
+    wanted->shape[3] = (size_t)term->inputs;
+    wanted->shape[4] = (size_t)term->outputs;
 }

@@ -33,6 +33,7 @@ typedef struct ascc_scratch_sizes {
     size_t reverse; /* of the way back, besides */
 } ascc_scratch_sizes;
 
+struct ascc_initial;
 struct ascc_network_run;
 struct ascc_tile;
 struct ascc_reverse;
@@ -50,11 +51,18 @@ typedef struct ascc_operation {
     /* Takes its own members out of the description, and the names of its tensors. NULL = it has none. */
     void (*read)(ascc_reader *reader, uint32_t object, const ascc_plan *plan, ascc_term *term,
                  const char *name[ASCC_MAX_TENSORS]);
-    /* Finds tensors, outputs and filter, and refuses what does not fit. layer: NULL of an output. */
+    /* Says what its tensors must be. `outputs` and cells that are 0 come from `stored`, the shape of its
+     * first tensor, zeros without a file. NULL, or no first tensor: `outputs` are the inputs, or check's. */
+    void (*tensors)(const ascc_plan *plan, ascc_term *term, const size_t *stored,
+                    ascc_tensor_wanted wanted[ASCC_MAX_TENSORS]);
+    /* Finds the filter and refuses what does not fit. layer: NULL of an output. */
     ascc_status (*check)(ascc_plan_builder *builder, const ascc_layer *layer,
                          ascc_term_entry *entry, const char *const name[ASCC_MAX_TENSORS]);
     /* Refuses numbers of the tensors that cannot be; NULL = any can. */
     const char *(*check_numbers)(const ascc_plan *plan, const ascc_term *term);
+
+    /* Values of a tensor to begin training with (model/initial.h); NULL: ascc_initial_default. */
+    void (*initial)(struct ascc_initial *initial);
 
     /* ---- Lengths, sizes, cost ---- */
 

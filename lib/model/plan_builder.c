@@ -1,4 +1,4 @@
-/* Collects the layers of a network and checks each against the tensors of its file.
+/* Collects the layers of a network and checks each against the tensors of its file, or lists them.
  * SPDX-License-Identifier: MIT */
 #include "plan_builder.h"
 
@@ -10,6 +10,7 @@
 
 #define FAIL(...) ascc_fail(builder->message, ASCC_ERROR_FORMAT, __VA_ARGS__)
 #define UNUSED SIZE_MAX
+#define MAX_WEIGHTS ((size_t)1 << 29)
 
 ascc_status ascc_plan_open(const ascc_allocator *allocator, const ascc_safetensors *file,
                            ascc_plan_builder *builder, ascc_message *message)
@@ -17,12 +18,28 @@ ascc_status ascc_plan_open(const ascc_allocator *allocator, const ascc_safetenso
     *builder = (ascc_plan_builder){.allocator = *allocator, .file = file, .message = message};
     builder->plan.level_count = 1;
     builder->plan.output.term.source = -1;
-    builder->offset = ascc_allocate(allocator, file->tensor_count, sizeof *builder->offset);
-    if (!builder->offset)
+    builder->tensor_capacity = file ? file->tensor_count : ASCC_SAFETENSORS_MAX_TENSORS;
+    builder->tensor_count = file ? file->tensor_count : 0;
+    builder->offset = ascc_allocate(allocator, builder->tensor_capacity, sizeof *builder->offset);
+    builder->tensor =
+        file ? file->tensor
+             : ascc_allocate(allocator, builder->tensor_capacity, sizeof *builder->tensor);
+    if (!builder->offset || !builder->tensor) {
+        ascc_plan_close(builder);
         return ascc_fail(message, ASCC_ERROR_MEMORY, "no memory for the plan");
-    for (size_t i = 0; i < file->tensor_count; i++)
+    }
+    for (size_t i = 0; i < builder->tensor_capacity; i++)
         builder->offset[i] = UNUSED;
     return ASCC_OK;
+}
+
+static void release_tensors(ascc_plan_builder *builder)
+{
+    for (size_t i = 0; i < builder->tensor_count; i++)
+        ascc_release(&builder->allocator, (char *)builder->tensor[i].name,
+                     strlen(builder->tensor[i].name) + 1, 1);
+    ascc_release(&builder->allocator, builder->tensor, builder->tensor_capacity,
+                 sizeof *builder->tensor);
 }
 
 void ascc_plan_close(ascc_plan_builder *builder)
@@ -34,11 +51,14 @@ void ascc_plan_close(ascc_plan_builder *builder)
         ascc_release(&builder->allocator, builder->term, builder->term_capacity,
                      sizeof *builder->term);
     if (builder->offset)
-        ascc_release(&builder->allocator, builder->offset, builder->file->tensor_count,
+        ascc_release(&builder->allocator, builder->offset, builder->tensor_capacity,
                      sizeof *builder->offset);
+    if (builder->tensor && !builder->file)
+        release_tensors(builder);
     builder->layer = NULL;
     builder->term = NULL;
     builder->offset = NULL;
+    builder->tensor = NULL;
 }
 
 ascc_status ascc_plan_text(ascc_plan_builder *builder, const char *what, const char *text,
@@ -145,53 +165,144 @@ static bool share_rows(int32_t a, int32_t b)
 
 /* ---- Tensors ------------------------------------------------------------------------------------ */
 
-ascc_status ascc_plan_find_tensor(ascc_plan_builder *builder, const char *name, int32_t rank,
-                                  int32_t *index)
+static int32_t find_by_name(const ascc_plan_builder *builder, const char *name)
 {
-    *index = ascc_safetensors_find(builder->file, name);
-    if (*index < 0)
-        return FAIL("tensor '%s' is missing", ascc_quote(name).text);
-    const ascc_tensor *tensor = &builder->file->tensor[*index];
+    if (builder->file)
+        return ascc_safetensors_find(builder->file, name);
+    for (size_t i = 0; i < builder->tensor_count; i++)
+        if (strcmp(builder->tensor[i].name, name) == 0)
+            return (int32_t)i;
+    return -1;
+}
+
+/* "[4, ?, 8]", with the text given for 0. */
+typedef struct shape_text {
+    char text[8 * 24];
+} shape_text;
+
+static shape_text shape_of(int32_t rank, const size_t *shape, const char *zero)
+{
+    shape_text t = {"["};
+    size_t used = 1;
+    for (int32_t i = 0; i < rank; i++) {
+        char number[24];
+        snprintf(number, sizeof number, "%zu", shape[i]);
+        used += (size_t)snprintf(t.text + used, sizeof t.text - used, "%s%s", i ? ", " : "",
+                                 shape[i] ? number : zero);
+    }
+    snprintf(t.text + used, sizeof t.text - used, "]");
+    return t;
+}
+
+/* Lists a tensor of that shape, all of which the description tells. */
+static ascc_status list_tensor(ascc_plan_builder *builder, const char *name,
+                               const ascc_tensor_wanted *wanted, int32_t *index)
+{
+    ascc_tensor tensor = {
+        .type = "F32", .element_size = sizeof(float), .rank = wanted->rank, .count = 1};
+    for (int32_t i = 0; i < wanted->rank; i++) {
+        if (!wanted->shape[i])
+            return FAIL(
+                "tensor '%s' must have the shape %s (%s), of which the description does not "
+                "tell all: 'cells' and 'outputs' do",
+                ascc_quote(name).text, shape_of(wanted->rank, wanted->shape, "?").text,
+                wanted->dimensions);
+        tensor.shape[i] = wanted->shape[i];
+        if (!ascc_multiply_size(tensor.count, wanted->shape[i], &tensor.count))
+            return FAIL("tensor '%s' is too large", ascc_quote(name).text);
+    }
+    if (builder->tensor_count == builder->tensor_capacity)
+        return FAIL("more than %d tensors", ASCC_SAFETENSORS_MAX_TENSORS);
+    char *copy = ascc_allocate(&builder->allocator, strlen(name) + 1, 1);
+    if (!copy)
+        return ascc_fail(builder->message, ASCC_ERROR_MEMORY, "no memory for tensors");
+    tensor.name = strcpy(copy, name);
+    *index = (int32_t)builder->tensor_count;
+    builder->tensor[builder->tensor_count++] = tensor;
+    return ASCC_OK;
+}
+
+static ascc_status find_tensor(ascc_plan_builder *builder, const char *name,
+                               const ascc_tensor_wanted *wanted, int32_t *index)
+{
+    *index = find_by_name(builder, name);
+    if (*index < 0) {
+        if (builder->file)
+            return FAIL("tensor '%s' is missing", ascc_quote(name).text);
+        const ascc_status status = list_tensor(builder, name, wanted, index);
+        if (status != ASCC_OK)
+            return status;
+    }
+    const ascc_tensor *tensor = &builder->tensor[*index];
     if (!ascc_tensor_is_float(tensor))
         return FAIL("tensor '%s' is %s; weights must be F32, F16 or BF16", ascc_quote(name).text,
                     tensor->type);
-    if (tensor->rank != rank)
-        return FAIL("tensor '%s' has %d dimensions, but must have %d", ascc_quote(name).text,
-                    (int)tensor->rank, (int)rank);
+    bool fits = tensor->rank == wanted->rank;
+    for (int32_t i = 0; i < wanted->rank; i++)
+        fits = fits && wanted->shape[i] && tensor->shape[i] == wanted->shape[i];
+    if (!fits)
+        return FAIL("tensor '%s' has the shape %s, but must have %s: %s", ascc_quote(name).text,
+                    shape_of(tensor->rank, tensor->shape, "0").text,
+                    shape_of(wanted->rank, wanted->shape, "?").text, wanted->dimensions);
     builder->offset[*index] = 0;
     return ASCC_OK;
 }
 
-ascc_status ascc_plan_check_inputs(ascc_plan_builder *builder, const ascc_tensor *tensor,
-                                   int32_t inputs, int32_t *outputs)
+/* Tensors of a term, and the numbers that the description leaves open, from the first one's shape. */
+static ascc_status find_tensors(ascc_plan_builder *builder, ascc_term_entry *entry,
+                                const char *const name[ASCC_MAX_TENSORS])
 {
-    const size_t in = tensor->shape[tensor->rank - 2], out = tensor->shape[tensor->rank - 1];
-    if (in != (size_t)inputs)
-        return FAIL("tensor '%s' takes %zu channels, but its source has %d",
-                    ascc_quote(tensor->name).text, in, (int)inputs);
-    if (out < 1 || out > ASCC_MAX_CHANNELS)
-        return FAIL("tensor '%s' gives %zu channels, but must give 1 to %d",
-                    ascc_quote(tensor->name).text, out, ASCC_MAX_CHANNELS);
-    *outputs = (int32_t)out;
-    return ASCC_OK;
+    static const size_t nothing[ASCC_SAFETENSORS_MAX_RANK];
+    const ascc_operation *operation = entry->term.operation;
+    ascc_tensor_wanted wanted[ASCC_MAX_TENSORS] = {{0}};
+    ascc_status status = ASCC_OK;
+    if (!operation->tensors)
+        return ASCC_OK;
+    const int32_t first = name[0] ? find_by_name(builder, name[0]) : -1;
+    operation->tensors(&builder->plan, &entry->term,
+                       first < 0 ? nothing : builder->tensor[first].shape, wanted);
+    for (int i = 0; i < ASCC_MAX_TENSORS && status == ASCC_OK; i++)
+        if (name[i])
+            status = find_tensor(builder, name[i], &wanted[i], &entry->tensor[i]);
+    return status;
 }
 
-ascc_status ascc_plan_check_cells(ascc_plan_builder *builder, const ascc_tensor *tensor,
-                                  int32_t half_axis, int32_t cells[3])
+void ascc_plan_take_outputs(ascc_term *term, size_t stored)
 {
-    size_t total = 1;
+    if (term->outputs == 0 && stored <= ASCC_MAX_CHANNELS)
+        term->outputs = (int32_t)stored;
+}
+
+void ascc_plan_want_bias(const ascc_term *term, ascc_tensor_wanted wanted[ASCC_MAX_TENSORS])
+{
+    wanted[ASCC_TENSOR_BIAS] =
+        (ascc_tensor_wanted){.dimensions = "outputs", .rank = 1, .shape = {(size_t)term->outputs}};
+}
+
+void ascc_plan_want_matrix(ascc_term *term, const size_t *stored,
+                           ascc_tensor_wanted wanted[ASCC_MAX_TENSORS])
+{
+    ascc_plan_take_outputs(term, stored[1]);
+    wanted[ASCC_TENSOR_WEIGHT] =
+        (ascc_tensor_wanted){.dimensions = "inputs, outputs",
+                             .rank = 2,
+                             .shape = {(size_t)term->inputs, (size_t)term->outputs}};
+    ascc_plan_want_bias(term, wanted);
+}
+
+/* Cells of a kernel: known, in no greater number than fits. */
+static ascc_status check_cells(ascc_plan_builder *builder, const ascc_filter *filter,
+                               const char *name)
+{
+    int64_t total = 1;
     for (int axis = 0; axis < 3; axis++) {
-        const size_t stored = tensor->shape[2 - axis];
-        const size_t whole = axis == half_axis ? 2 * stored : stored;
-        if (stored < 1 || stored > ASCC_MAX_CELLS || whole * total > ASCC_MAX_CELLS)
-            return FAIL("tensor '%s' is a kernel of no or more than %d cells",
-                        ascc_quote(tensor->name).text, ASCC_MAX_CELLS);
-        total *= whole;
-        cells[axis] = (int32_t)whole;
+        total *= filter->cells[axis];
+        if (filter->cells[axis] < 1 || total > ASCC_MAX_CELLS)
+            return FAIL("%s: a kernel of no or more than %d cells", name, ASCC_MAX_CELLS);
     }
-    if (builder->plan.dimension == 2 && cells[2] != 1)
-        return FAIL("tensor '%s' has %d cells along z, but must have 1 in 2D",
-                    ascc_quote(tensor->name).text, (int)cells[2]);
+    if (builder->plan.dimension == 2 && filter->cells[2] != 1)
+        return FAIL("%s: a kernel has %d cells along z, but must have 1 in 2D", name,
+                    (int)filter->cells[2]);
     return ASCC_OK;
 }
 
@@ -206,31 +317,7 @@ ascc_status ascc_plan_check_filter(ascc_plan_builder *builder, const ascc_filter
         return FAIL("%s: 'bumps' must be within 1 and %d", name, ASCC_MAX_BUMPS);
     if (filter->order < 0 || filter->order > ASCC_MAX_ORDER)
         return FAIL("%s: 'order' must be within 0 and %d", name, ASCC_MAX_ORDER);
-    return ASCC_OK;
-}
-
-ascc_status ascc_plan_check_matrix(ascc_plan_builder *builder, ascc_term_entry *entry,
-                                   const char *name)
-{
-    int32_t *index = &entry->tensor[ASCC_TENSOR_WEIGHT];
-    const ascc_status status = ascc_plan_find_tensor(builder, name, 2, index);
-    return status == ASCC_OK ? ascc_plan_check_inputs(builder, &builder->file->tensor[*index],
-                                                      entry->term.gathered, &entry->term.outputs)
-                             : status;
-}
-
-ascc_status ascc_plan_check_bias(ascc_plan_builder *builder, ascc_term_entry *entry,
-                                 const char *name)
-{
-    int32_t *index = &entry->tensor[ASCC_TENSOR_BIAS];
-    const ascc_status status = name ? ascc_plan_find_tensor(builder, name, 1, index) : ASCC_OK;
-    if (!name || status != ASCC_OK)
-        return status;
-    if (builder->file->tensor[*index].count != (size_t)entry->term.outputs)
-        return FAIL("tensor '%s' has %zu values, but its term gives %d channels",
-                    ascc_quote(name).text, builder->file->tensor[*index].count,
-                    (int)entry->term.outputs);
-    return ASCC_OK;
+    return check_cells(builder, filter, name);
 }
 
 ascc_status ascc_plan_check_shared(ascc_plan_builder *builder, const ascc_layer *layer,
@@ -291,12 +378,22 @@ static ascc_status check_term(ascc_plan_builder *builder, ascc_term_entry *entry
         return FAIL("layer '%s': a source that is not made before it",
                     ascc_quote(layer->name).text);
     term->inputs = ascc_plan_value_channels(plan, builder->layer, term->source);
-    term->outputs = term->gathered = term->inputs;
+    term->gathered = term->inputs;
     if (term->inputs == 0)
         return FAIL("layer '%s': a source without channels", ascc_quote(layer->name).text);
-    const ascc_status status = term->operation->check(builder, layer, entry, name);
+    const int32_t given = term->outputs;
+    if (!term->operation->tensors || !name[0])
+        term->outputs = term->inputs;
+    else if (!given && !builder->file)
+        term->outputs = layer->channels > term->column ? layer->channels - term->column : 0;
+    ascc_status status = find_tensors(builder, entry, name);
+    if (status == ASCC_OK)
+        status = term->operation->check(builder, layer, entry, name);
     if (status != ASCC_OK)
         return status;
+    if (given && given != term->outputs)
+        return FAIL("layer '%s': 'outputs' is %d, but a term gives %d channels",
+                    ascc_quote(layer->name).text, (int)given, (int)term->outputs);
     if (term->column < 0 || term->column > layer->channels - term->outputs)
         return FAIL("layer '%s': columns [%ld, %ld) of a term lie beyond its %d channels",
                     ascc_quote(layer->name).text, (long)term->column,
@@ -349,13 +446,15 @@ ascc_status ascc_plan_set_output(ascc_plan_builder *builder, const ascc_output *
     if (set != ASCC_SET_FLUID && set != ASCC_SET_ALL)
         return FAIL("output: its source must lie on the points 'fluid' or 'all'");
     term->inputs = ascc_plan_value_channels(plan, builder->layer, term->source);
-    term->outputs = term->inputs;
+    term->outputs = term->operation->tensors ? plan->dimension : term->inputs;
     if (term->inputs == 0)
         return FAIL("output: a source without channels");
     for (int i = 0; i < 3; i++)
         if (!(fabs(plan->output.scale[i]) <= ASCC_PLAN_MAX))
             return FAIL("output: 'scale' is not finite");
-    const ascc_status status = term->operation->check(builder, NULL, &builder->output, name);
+    ascc_status status = find_tensors(builder, &builder->output, name);
+    if (status == ASCC_OK)
+        status = term->operation->check(builder, NULL, &builder->output, name);
     if (status != ASCC_OK)
         return status;
     if (term->outputs != plan->dimension)
@@ -383,7 +482,7 @@ static ascc_status check_numbers(ascc_plan_builder *builder, const ascc_plan *pl
     for (int i = 0; i < ASCC_MAX_TENSORS; i++) {
         if (!term->tensor[i] || !(term->operation->not_negative >> i & 1))
             continue;
-        const ascc_tensor *tensor = &builder->file->tensor[entry->tensor[i]];
+        const ascc_tensor *tensor = &builder->tensor[entry->tensor[i]];
         for (size_t k = 0; k < tensor->count; k++)
             if (term->tensor[i][k] < 0.0f)
                 return FAIL("tensor '%s' has a negative number, but damps",
@@ -394,23 +493,23 @@ static ascc_status check_numbers(ascc_plan_builder *builder, const ascc_plan *pl
     if (!why)
         return ASCC_OK;
     return FAIL("tensor '%s' %s",
-                ascc_quote(builder->file->tensor[entry->tensor[ASCC_TENSOR_WEIGHT]].name).text,
-                why);
+                ascc_quote(builder->tensor[entry->tensor[ASCC_TENSOR_WEIGHT]].name).text, why);
 }
 
 /* Where each tensor will lie; refuses one that nobody reads. */
 static ascc_status place_tensors(ascc_plan_builder *builder, size_t *count, uint64_t *parameters)
 {
-    const ascc_safetensors *file = builder->file;
     *count = 0;
     *parameters = 0;
-    for (size_t i = 0; i < file->tensor_count; i++) {
+    for (size_t i = 0; i < builder->tensor_count; i++) {
+        const ascc_tensor *tensor = &builder->tensor[i];
         if (builder->offset[i] == UNUSED)
-            return FAIL("tensor '%s' is not used by the network",
-                        ascc_quote(file->tensor[i].name).text);
+            return FAIL("tensor '%s' is not used by the network", ascc_quote(tensor->name).text);
+        if (tensor->count > MAX_WEIGHTS - *count)
+            return FAIL("the network has more than %zu weights", MAX_WEIGHTS);
         builder->offset[i] = *count;
-        *count += ascc_plan_align(file->tensor[i].count);
-        *parameters += file->tensor[i].count;
+        *count += ascc_plan_align(tensor->count);
+        *parameters += tensor->count;
     }
     return ASCC_OK;
 }
@@ -418,7 +517,6 @@ static ascc_status place_tensors(ascc_plan_builder *builder, size_t *count, uint
 ascc_status ascc_plan_finish(ascc_plan_builder *builder, ascc_plan *plan, float **weights,
                              size_t *weight_count)
 {
-    const ascc_safetensors *file = builder->file;
     size_t count;
     *plan = builder->plan;
     *weights = NULL;
@@ -436,9 +534,11 @@ ascc_status ascc_plan_finish(ascc_plan_builder *builder, ascc_plan *plan, float 
         memcpy(plan->layer, builder->layer, layers * sizeof *plan->layer);
     for (size_t i = 0; i < terms && status == ASCC_OK; i++)
         plan->term[i] = placed_term(builder, &builder->term[i], block);
-    for (size_t i = 0; i < file->tensor_count && status == ASCC_OK; i++)
-        status =
-            ascc_tensor_read_floats(&file->tensor[i], block + builder->offset[i], builder->message);
+    if (status == ASCC_OK && !builder->file)
+        memset(block, 0, count * sizeof *block);
+    for (size_t i = 0; builder->file && i < builder->tensor_count && status == ASCC_OK; i++)
+        status = ascc_tensor_read_floats(&builder->tensor[i], block + builder->offset[i],
+                                         builder->message);
     if (status == ASCC_OK)
         plan->output.term = placed_term(builder, &builder->output, block);
     for (size_t i = 0; i < terms && status == ASCC_OK; i++)

@@ -1,5 +1,5 @@
-/* Collects the layers of a network and checks each against the tensors of its file.
- * SPDX-License-Identifier: MIT
+/* Collects the layers of a network and checks each against the tensors of its file; or without a file says
+ * which tensors it wants. SPDX-License-Identifier: MIT
  *
  * A reader of a description fills `plan`'s own numbers, adds features, levels, layers, terms and the
  * output in this order, then finishes. What every term must obey is checked here, once, so that no
@@ -17,9 +17,17 @@ typedef struct ascc_term_entry {
     int32_t tensor[ASCC_MAX_TENSORS];
 } ascc_term_entry;
 
+/* What a tensor must be. */
+typedef struct ascc_tensor_wanted {
+    const char *dimensions; /* their names, for messages */
+    int32_t rank;
+    int32_t reserved;
+    size_t shape[ASCC_SAFETENSORS_MAX_RANK]; /* 0 = nothing tells */
+} ascc_tensor_wanted;
+
 typedef struct ascc_plan_builder {
     ascc_allocator allocator;
-    const ascc_safetensors *file;
+    const ascc_safetensors *file; /* NULL: none yet, weights are zeros */
     ascc_message *message;
     ascc_plan plan; /* layer and term are NULL until finished */
     ascc_layer *layer;
@@ -27,9 +35,13 @@ typedef struct ascc_plan_builder {
     ascc_term_entry *term;
     size_t term_capacity;
     ascc_term_entry output;
+    /* The file's tensors, or the wanted ones, whose names are the builder's. */
+    ascc_tensor *tensor;
+    size_t tensor_count, tensor_capacity;
     size_t *offset; /* of each tensor in the weights; SIZE_MAX = not used */
 } ascc_plan_builder;
 
+/* file: NULL to find out which tensors a description wants. */
 ascc_status ascc_plan_open(const ascc_allocator *allocator, const ascc_safetensors *file,
                            ascc_plan_builder *builder, ascc_message *message);
 void ascc_plan_close(ascc_plan_builder *builder);
@@ -42,7 +54,7 @@ ascc_status ascc_plan_text(ascc_plan_builder *builder, const char *what, const c
 ascc_status ascc_plan_begin(ascc_plan_builder *builder);
 ascc_status ascc_plan_add_layer(ascc_plan_builder *builder, const char *name, int32_t set,
                                 int32_t channels);
-/* A term of the layer added last: `inputs`, `outputs` and `filter.cells` are found here. */
+/* A term of the layer added last: `inputs` are found here, `outputs` and `filter.cells` unless given. */
 ascc_status ascc_plan_add_term(ascc_plan_builder *builder, const ascc_term *term,
                                const char *const name[ASCC_MAX_TENSORS]);
 ascc_status ascc_plan_set_output(ascc_plan_builder *builder, const ascc_output *output,
@@ -51,25 +63,16 @@ ascc_status ascc_plan_set_output(ascc_plan_builder *builder, const ascc_output *
 /* Value of that name ("fluid", "boundary" or a layer's), -1 = none. */
 int32_t ascc_plan_find_value(const ascc_plan_builder *builder, const char *name);
 
-/* ---- What operations check with; errors: FORMAT, the message names layer or tensor ---- */
+/* ---- What operations want and check with; errors: FORMAT, the message names layer or tensor ---- */
 
-/* Finds a tensor of floats of this rank. */
-ascc_status ascc_plan_find_tensor(ascc_plan_builder *builder, const char *name, int32_t rank,
-                                  int32_t *index);
-/* Its last two dimensions are [inputs][outputs]; finds outputs. */
-ascc_status ascc_plan_check_inputs(ascc_plan_builder *builder, const ascc_tensor *tensor,
-                                   int32_t inputs, int32_t *outputs);
-/* Reads the cells of a kernel [z][y][x][in][out], of which `half_axis` (-1 = none) is halved. */
-ascc_status ascc_plan_check_cells(ascc_plan_builder *builder, const ascc_tensor *tensor,
-                                  int32_t half_axis, int32_t cells[3]);
+/* Numbers that the description leaves open (0) become those of the tensor as it is stored. */
+void ascc_plan_take_outputs(ascc_term *term, size_t stored);
+/* A bias [outputs]; and a weight [inputs][outputs] with it. */
+void ascc_plan_want_bias(const ascc_term *term, ascc_tensor_wanted wanted[ASCC_MAX_TENSORS]);
+void ascc_plan_want_matrix(ascc_term *term, const size_t *stored,
+                           ascc_tensor_wanted wanted[ASCC_MAX_TENSORS]);
 ascc_status ascc_plan_check_filter(ascc_plan_builder *builder, const ascc_filter *filter,
                                    const char *name);
-/* A weight [inputs][outputs]. */
-ascc_status ascc_plan_check_matrix(ascc_plan_builder *builder, ascc_term_entry *entry,
-                                   const char *name);
-/* A bias [outputs], if there is a name; outputs are known by then. */
-ascc_status ascc_plan_check_bias(ascc_plan_builder *builder, ascc_term_entry *entry,
-                                 const char *name);
 /* Source and layer have rows in common. */
 ascc_status ascc_plan_check_shared(ascc_plan_builder *builder, const ascc_layer *layer,
                                    const ascc_term *term);

@@ -1,6 +1,7 @@
 /* Columns gathered from neighbours, as column.h draws them. SPDX-License-Identifier: MIT */
 #include "column.h"
 
+#include <stdio.h>
 #include <string.h>
 
 #include "model/cost.h"
@@ -204,28 +205,17 @@ static ascc_status check_relative(ascc_plan_builder *builder, const ascc_term *t
 }
 
 ascc_status ascc_convolution_check(ascc_plan_builder *builder, const ascc_layer *layer,
-                                   ascc_term_entry *entry, const char *const name[ASCC_MAX_TENSORS],
-                                   int32_t rank,
-                                   ascc_status (*cells)(ascc_plan_builder *, const ascc_tensor *,
-                                                        ascc_filter *))
+                                   ascc_term_entry *entry, const char *const name[ASCC_MAX_TENSORS])
 {
-    ascc_term *term = &entry->term;
-    int32_t *index = &entry->tensor[ASCC_TENSOR_WEIGHT];
-    ascc_status status = ASCC_OK;
-    if (ascc_term_is_relative(term))
-        status = check_relative(builder, term, layer);
-    if (status == ASCC_OK)
-        status = ascc_plan_find_tensor(builder, name[ASCC_TENSOR_WEIGHT], rank, index);
+    (void)name;
+    const ascc_term *term = &entry->term;
+    const ascc_status status =
+        ascc_term_is_relative(term) ? check_relative(builder, term, layer) : ASCC_OK;
     if (status != ASCC_OK)
         return status;
-    const ascc_tensor *tensor = &builder->file->tensor[*index];
-    status = ascc_plan_check_inputs(builder, tensor, term->inputs, &term->outputs);
-    if (status == ASCC_OK)
-        status = cells(builder, tensor, &term->filter);
-    if (status == ASCC_OK)
-        status = ascc_plan_check_filter(builder, &term->filter, ascc_quote(layer->name).text);
-    return status == ASCC_OK ? ascc_plan_check_bias(builder, entry, name[ASCC_TENSOR_BIAS])
-                             : status;
+    char where[64];
+    snprintf(where, sizeof where, "layer '%.31s'", ascc_quote(layer->name).text);
+    return ascc_plan_check_filter(builder, &term->filter, where);
 }
 
 bool ascc_convolution_reads_features(const ascc_term *term)

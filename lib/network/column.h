@@ -72,12 +72,10 @@ int ascc_convolution_lists(const ascc_plan *plan, const ascc_term *term, int32_t
 /* Its options and names beside those of the filter. */
 void ascc_convolution_read(ascc_reader *reader, uint32_t object, ascc_term *term,
                            const char *name[ASCC_MAX_TENSORS]);
-/* Kernel of this rank, inputs, outputs, filter, bias, options. */
+/* Filter and options. */
 ascc_status ascc_convolution_check(ascc_plan_builder *builder, const ascc_layer *layer,
-                                   ascc_term_entry *entry, const char *const name[ASCC_MAX_TENSORS],
-                                   int32_t rank,
-                                   ascc_status (*cells)(ascc_plan_builder *, const ascc_tensor *,
-                                                        ascc_filter *));
+                                   ascc_term_entry *entry,
+                                   const char *const name[ASCC_MAX_TENSORS]);
 bool ascc_convolution_reads_features(const ascc_term *term);
 /* reached: cells that a neighbour adds to. */
 double ascc_convolution_cost(const ascc_plan *plan, const ascc_cost_counts *counts, int32_t set,

@@ -5,20 +5,69 @@
 
 #include "column.h"
 #include "model/filter.h"
+#include "model/initial.h"
 
 static void read_basis(ascc_reader *reader, uint32_t object, const ascc_plan *plan, ascc_term *term,
                        const char *name[ASCC_MAX_TENSORS])
 {
-    (void)plan;
-    ascc_filter_read_basis(reader, object, &term->filter, false);
+    ascc_filter_read_basis(reader, object, plan->dimension, &term->filter, false);
     ascc_convolution_read(reader, object, term, name);
 }
 
-static ascc_status check(ascc_plan_builder *builder, const ascc_layer *layer,
-                         ascc_term_entry *entry, const char *const name[ASCC_MAX_TENSORS])
+static void tensors(const ascc_plan *plan, ascc_term *term, const size_t *stored,
+                    ascc_tensor_wanted wanted[ASCC_MAX_TENSORS])
 {
-    return ascc_convolution_check(builder, layer, entry, name, 4, ascc_filter_check_basis);
+    (void)plan;
+    const ascc_filter *f = &term->filter;
+    ascc_plan_take_outputs(term, stored[3]);
+    wanted[ASCC_TENSOR_WEIGHT] =
+        (ascc_tensor_wanted){.dimensions = "bumps, harmonics, inputs, outputs",
+                             .rank = 4,
+                             .shape = {(size_t)f->cells[1], (size_t)f->cells[0],
+                                       (size_t)term->inputs, (size_t)term->outputs}};
+    ascc_plan_want_bias(term, wanted);
 }
+
+/* ---- Initial values ---- */
+
+static double bump(const ascc_filter *filter, int32_t k, double rho)
+{
+    const double t = filter->bumps * rho - k;
+    return t > -1.0 && t < 1.0 ? (1.0 - t * t) * (1.0 - t * t) : 0.0;
+}
+
+/* What a member of the basis sums to, over neighbours of values about 1. */
+static double member_size(const ascc_initial *initial, int32_t k, int32_t harmonic)
+{
+    const double sum = ascc_initial_sum(initial, bump, k, 1);
+    if (harmonic == 0)
+        return sum + (ascc_initial_sees_itself(initial) && k == 0 ? 1.0 : 0.0);
+    if (ascc_initial_source(initial) == ASCC_SET_BOUNDARY)
+        return 0.5 * sum; /* walls lie on one side */
+    return sqrt(ascc_initial_sum(initial, bump, k, 2) / initial->plan->dimension);
+}
+
+/* Each member alike, and what comes from another scale half of it: it stands beside the scale's own. */
+static void fill_initial(ascc_initial *initial)
+{
+    const ascc_term *term = initial->term;
+    const int32_t harmonics = term->filter.cells[0], set = ascc_initial_source(initial);
+    const size_t cells = ascc_cell_count(&term->filter);
+    const size_t values = (size_t)term->inputs * (size_t)term->outputs;
+    const bool crosses = set != initial->layer->set && set != ASCC_SET_BOUNDARY &&
+                         (set >= ASCC_SET_LEVEL || initial->layer->set >= ASCC_SET_LEVEL);
+    const double share = (crosses ? 0.5 : 1.0) / sqrt((double)cells * term->inputs);
+    if (initial->number != ASCC_TENSOR_WEIGHT) {
+        ascc_initial_default(initial);
+        return;
+    }
+    for (size_t c = 0; c < cells; c++) {
+        const double size = member_size(initial, (int32_t)c / harmonics, (int32_t)c % harmonics);
+        ascc_initial_fill(initial, c * values, values, share / fmax(size, 1.0));
+    }
+}
+
+/* ---- Cost, and the way forwards ---- */
 
 /* Two radial functions reach a neighbour, beyond the last one's centre one. */
 static double cost(const ascc_plan *plan, const ascc_cost_counts *counts, int32_t set,
@@ -144,7 +193,9 @@ const ascc_operation ascc_op_basis = {.name = "convolution in a basis",
                                       .type = "convolution",
                                       .with = "basis",
                                       .read = read_basis,
-                                      .check = check,
+                                      .tensors = tensors,
+                                      .check = ascc_convolution_check,
+                                      .initial = fill_initial,
                                       .lists = ascc_convolution_lists,
                                       .packed_size = ascc_matrix_packed_size,
                                       .pack = ascc_matrix_pack,

@@ -15,15 +15,19 @@ static void read_dense(ascc_reader *reader, uint32_t object, const ascc_plan *pl
     name[ASCC_TENSOR_BIAS] = ascc_reader_optional_text(reader, object, "bias");
 }
 
+static void tensors(const ascc_plan *plan, ascc_term *term, const size_t *stored,
+                    ascc_tensor_wanted wanted[ASCC_MAX_TENSORS])
+{
+    (void)plan;
+    ascc_plan_want_matrix(term, stored, wanted);
+}
+
 static ascc_status check(ascc_plan_builder *builder, const ascc_layer *layer,
                          ascc_term_entry *entry, const char *const name[ASCC_MAX_TENSORS])
 {
+    (void)name;
     entry->term.filter = (ascc_filter){.cells = {1, 1, 1}};
-    ascc_status status = ascc_plan_check_shared(builder, layer, &entry->term);
-    if (status == ASCC_OK)
-        status = ascc_plan_check_matrix(builder, entry, name[ASCC_TENSOR_WEIGHT]);
-    return status == ASCC_OK ? ascc_plan_check_bias(builder, entry, name[ASCC_TENSOR_BIAS])
-                             : status;
+    return ascc_plan_check_shared(builder, layer, &entry->term);
 }
 
 static double cost(const ascc_plan *plan, const ascc_cost_counts *counts, int32_t set,
@@ -82,6 +86,7 @@ static void backward(const ascc_reverse *pass, const ascc_layer *layer, const as
 const ascc_operation ascc_op_dense = {.name = "dense",
                                       .type = "dense",
                                       .read = read_dense,
+                                      .tensors = tensors,
                                       .check = check,
                                       .packed_size = ascc_matrix_packed_size,
                                       .pack = ascc_matrix_pack,

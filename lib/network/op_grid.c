@@ -1,7 +1,10 @@
 /* A continuous convolution with its kernel on a grid (paper Eq. 1). SPDX-License-Identifier: MIT */
+#include <math.h>
+
 #include "column.h"
 #include "cube.h"
 #include "model/filter.h"
+#include "model/initial.h"
 
 static void read_grid(ascc_reader *reader, uint32_t object, const ascc_plan *plan, ascc_term *term,
                       const char *name[ASCC_MAX_TENSORS])
@@ -11,17 +14,54 @@ static void read_grid(ascc_reader *reader, uint32_t object, const ascc_plan *pla
     ascc_convolution_read(reader, object, term, name);
 }
 
-static ascc_status find_cells(ascc_plan_builder *builder, const ascc_tensor *tensor,
-                              ascc_filter *filter)
+static void tensors(const ascc_plan *plan, ascc_term *term, const size_t *stored,
+                    ascc_tensor_wanted wanted[ASCC_MAX_TENSORS])
 {
-    return ascc_plan_check_cells(builder, tensor, -1, filter->cells);
+    (void)plan;
+    ascc_filter_want_grid(term, -1, stored, &wanted[ASCC_TENSOR_WEIGHT]);
+    ascc_plan_want_bias(term, wanted);
 }
 
-static ascc_status check(ascc_plan_builder *builder, const ascc_layer *layer,
-                         ascc_term_entry *entry, const char *const name[ASCC_MAX_TENSORS])
+/* ---- Initial values ---- */
+
+static double window(const ascc_filter *filter, int32_t k, double rho)
 {
-    return ascc_convolution_check(builder, layer, entry, name, 5, find_cells);
+    (void)k;
+    const double q = 1.0 - rho * rho;
+    return filter->window == ASCC_WINDOW_POLY6  ? q * q * q
+           : filter->window == ASCC_WINDOW_PEAK ? (1.0 - rho) * (1.0 - rho)
+                                                : 1.0;
 }
+
+/* Convolutions of the layer that add to the term's columns, itself one. */
+static int32_t convolutions_beside(const ascc_initial *initial)
+{
+    int32_t count = 0;
+    for (int32_t i = 0; i < initial->layer->term_count; i++) {
+        const ascc_term *a = initial->term;
+        const ascc_term *b = &initial->plan->term[initial->layer->first_term + i];
+        count += b->operation == a->operation && b->column < a->column + a->outputs &&
+                 a->column < b->column + b->outputs;
+    }
+    return count;
+}
+
+/* Values spread over the cells; a column holds what the window sums to. */
+static void fill_initial(ascc_initial *initial)
+{
+    const ascc_term *term = initial->term;
+    const double cells = (double)ascc_cell_count(&term->filter);
+    const double seen =
+        (ascc_initial_sees_itself(initial) ? 1.0 : 0.0) + ascc_initial_sum(initial, window, 0, 1);
+    if (initial->number == ASCC_TENSOR_WEIGHT)
+        ascc_initial_fill(initial, 0, initial->count,
+                          sqrt(cells / ((double)term->inputs * convolutions_beside(initial))) /
+                              fmax(seen, 1.0));
+    else
+        ascc_initial_default(initial);
+}
+
+/* ---- Cost, and the way forwards ---- */
 
 static double cost(const ascc_plan *plan, const ascc_cost_counts *counts, int32_t set,
                    const ascc_term *term)
@@ -103,7 +143,9 @@ static void backward(const ascc_reverse *pass, const ascc_layer *layer, const as
 const ascc_operation ascc_op_grid = {.name = "convolution on a grid",
                                      .type = "convolution",
                                      .read = read_grid,
-                                     .check = check,
+                                     .tensors = tensors,
+                                     .check = ascc_convolution_check,
+                                     .initial = fill_initial,
                                      .lists = ascc_convolution_lists,
                                      .packed_size = ascc_matrix_packed_size,
                                      .pack = ascc_matrix_pack,

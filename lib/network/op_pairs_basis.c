@@ -11,6 +11,7 @@
 #include "column.h"
 #include "model/cost.h"
 #include "model/filter.h"
+#include "model/initial.h"
 #include "pair_reverse.h"
 #include "pair_sum.h"
 
@@ -26,10 +27,9 @@ static void read_pairs(ascc_reader *reader, uint32_t object, const ascc_plan *pl
                        const char *name[ASCC_MAX_TENSORS])
 {
     static const char *const directions[] = {"current"};
-    (void)plan;
     ascc_output *output = (ascc_output *)term; /* its first member */
     name[ASCC_TENSOR_STRENGTH] = ascc_reader_text(reader, object, "kernel");
-    ascc_filter_read_basis(reader, object, &term->filter, true);
+    ascc_filter_read_basis(reader, object, plan->dimension, &term->filter, true);
     if (ascc_reader_has(reader, object, "direction"))
         output->current_direction =
             1 + ascc_reader_choice(reader, object, "direction", directions, 1);
@@ -44,13 +44,33 @@ static void read_pairs(ascc_reader *reader, uint32_t object, const ascc_plan *pl
     name[ASCC_TENSOR_WALL] = ascc_reader_text(reader, walls, "kernel");
     name[ASCC_TENSOR_WALL_DAMPING] = ascc_reader_optional_text(reader, walls, "damping");
     if (ascc_reader_has(reader, walls, "basis"))
-        ascc_filter_read_basis(reader, walls, &output->walls, true);
+        ascc_filter_read_basis(reader, walls, plan->dimension, &output->walls, true);
     else
         ascc_reader_fail(reader, "a basis is missing");
     if (ascc_reader_has(reader, walls, "contact"))
         output->contact = ascc_reader_number(reader, walls, "contact", 0.0, output->walls.radius);
     ascc_reader_end(reader, walls);
     ascc_reader_where(reader, "output");
+}
+
+static void tensors(const ascc_plan *plan, ascc_term *term, const size_t *stored,
+                    ascc_tensor_wanted wanted[ASCC_MAX_TENSORS])
+{
+    (void)stored;
+    for (int part = 0; part < PARTS; part++) {
+        const ascc_filter *filter = part < ASCC_TENSOR_WALL ? &term->filter : &plan->output.walls;
+        wanted[part] = (ascc_tensor_wanted){.dimensions = "bumps, inputs",
+                                            .rank = 2,
+                                            .shape = {(size_t)filter->bumps, (size_t)term->inputs}};
+    }
+}
+
+/* Weak, so that training begins near a fluid that falls freely, and hardly bounces. */
+static void fill_initial(ascc_initial *initial)
+{
+    const bool damps = initial->term->operation->not_negative >> initial->number & 1;
+    ascc_initial_fill(initial, 0, initial->count,
+                      (damps ? 0.05 : 0.02) * ascc_initial_output(initial->plan));
 }
 
 #define FAIL(...) ascc_fail(builder->message, ASCC_ERROR_FORMAT, __VA_ARGS__)
@@ -81,15 +101,9 @@ static ascc_status check(ascc_plan_builder *builder, const ascc_layer *layer,
     ascc_output *output = &builder->plan.output;
     output->conserves = output->central = 1;
     term->filter.skip_self = 1;
-    term->outputs = builder->plan.dimension;
     ascc_status status = ascc_plan_check_filter(builder, &term->filter, "output");
     if (status == ASCC_OK && output->has_walls)
         status = ascc_plan_check_filter(builder, &output->walls, "output 'walls'");
-    for (int part = 0; part < PARTS && status == ASCC_OK; part++)
-        if (name[part])
-            status = ascc_filter_check_central(
-                builder, term->inputs, part < ASCC_TENSOR_WALL ? &term->filter : &output->walls,
-                name[part], &entry->tensor[part]);
     return status == ASCC_OK ? check_options(builder, term, name) : status;
 }
 
@@ -616,7 +630,9 @@ const ascc_operation ascc_op_pairs_basis = {.name = "pairs in a basis",
                                             .not_negative = 1u << ASCC_TENSOR_DAMPING |
                                                             1u << ASCC_TENSOR_WALL_DAMPING,
                                             .read = read_pairs,
+                                            .tensors = tensors,
                                             .check = check,
+                                            .initial = fill_initial,
                                             .lists = lists,
                                             .packed_size = packed_size,
                                             .pack = pack,

@@ -10,6 +10,7 @@
 #include "cube.h"
 #include "model/cost.h"
 #include "model/filter.h"
+#include "model/initial.h"
 #include "pair_reverse.h"
 #include "pair_sum.h"
 
@@ -28,25 +29,38 @@ static void read_pairs(ascc_reader *reader, uint32_t object, const ascc_plan *pl
         output->half_axis = ascc_reader_choice(reader, object, "half_axis", axes, 3);
 }
 
+static void tensors(const ascc_plan *plan, ascc_term *term, const size_t *stored,
+                    ascc_tensor_wanted wanted[ASCC_MAX_TENSORS])
+{
+    ascc_filter_want_grid(term, plan->output.half_axis, stored, &wanted[ASCC_TENSOR_WEIGHT]);
+}
+
 static ascc_status check(ascc_plan_builder *builder, const ascc_layer *layer,
                          ascc_term_entry *entry, const char *const name[ASCC_MAX_TENSORS])
 {
     (void)layer;
+    (void)name;
     ascc_term *term = &entry->term;
     ascc_output *output = &builder->plan.output;
-    int32_t *index = &entry->tensor[ASCC_TENSOR_WEIGHT];
     output->conserves = 1;
     term->filter.skip_self = 1;
-    ascc_status status = ascc_plan_check_filter(builder, &term->filter, "output");
-    if (status == ASCC_OK)
-        status = ascc_plan_find_tensor(builder, name[ASCC_TENSOR_WEIGHT], 5, index);
-    if (status != ASCC_OK)
-        return status;
-    const ascc_tensor *tensor = &builder->file->tensor[*index];
-    status = ascc_plan_check_inputs(builder, tensor, term->inputs, &term->outputs);
-    return status == ASCC_OK
-               ? ascc_plan_check_cells(builder, tensor, output->half_axis, term->filter.cells)
-               : status;
+    if (output->half_axis >= 0 && term->filter.cells[output->half_axis] % 2)
+        return ascc_fail(builder->message, ASCC_ERROR_FORMAT,
+                         "output: 'cells' along the half axis are not even");
+    return ascc_plan_check_filter(builder, &term->filter, "output");
+}
+
+/* Weak; a kernel that is stored whole is its own mirror, negated. */
+static void fill_initial(ascc_initial *initial)
+{
+    const size_t values = (size_t)initial->term->inputs * (size_t)initial->term->outputs;
+    const size_t cells = initial->count / values;
+    const bool whole = initial->plan->output.half_axis < 0;
+    ascc_initial_fill(initial, 0, (whole ? cells / 2 : cells) * values,
+                      0.002 * ascc_initial_output(initial->plan));
+    for (size_t c = 0; whole && c < cells / 2; c++)
+        for (size_t i = 0; i < values; i++)
+            initial->value[(cells - 1 - c) * values + i] = -initial->value[c * values + i];
 }
 
 static int lists(const ascc_plan *plan, const ascc_term *term, int32_t set,
@@ -339,7 +353,9 @@ static ascc_status backward(ascc_reverse *pass)
 const ascc_operation ascc_op_pairs_grid = {.name = "pairs on a grid",
                                            .type = "antisymmetric",
                                            .read = read_pairs,
+                                           .tensors = tensors,
                                            .check = check,
+                                           .initial = fill_initial,
                                            .check_numbers = check_numbers,
                                            .lists = lists,
                                            .packed_size = packed_size,

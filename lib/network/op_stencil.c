@@ -73,28 +73,31 @@ static ascc_status check_lattice(ascc_plan_builder *builder, const ascc_layer *l
     return ASCC_OK;
 }
 
+static void tensors(const ascc_plan *plan, ascc_term *term, const size_t *stored,
+                    ascc_tensor_wanted wanted[ASCC_MAX_TENSORS])
+{
+    ascc_plan_take_outputs(term, stored[2]);
+    wanted[ASCC_TENSOR_WEIGHT] = (ascc_tensor_wanted){
+        .dimensions = "taps, inputs, outputs",
+        .rank = 3,
+        .shape = {taps_of(plan), (size_t)tap_inputs(plan, term), (size_t)term->outputs}};
+    ascc_plan_want_bias(term, wanted);
+}
+
 static ascc_status check(ascc_plan_builder *builder, const ascc_layer *layer,
                          ascc_term_entry *entry, const char *const name[ASCC_MAX_TENSORS])
 {
+    (void)name;
     const ascc_plan *plan = &builder->plan;
     ascc_term *term = &entry->term;
-    int32_t *index = &entry->tensor[ASCC_TENSOR_WEIGHT];
-    ascc_status status = check_lattice(builder, layer, term);
-    if (status == ASCC_OK)
-        status = ascc_plan_find_tensor(builder, name[ASCC_TENSOR_WEIGHT], 3, index);
+    const ascc_status status = check_lattice(builder, layer, term);
     if (status != ASCC_OK)
         return status;
-    const ascc_tensor *tensor = &builder->file->tensor[*index];
-    if (tensor->shape[0] != taps_of(plan))
-        return FAIL("tensor '%s' has %zu taps, but a stencil has %zu",
-                    ascc_quote(tensor->name).text, tensor->shape[0], taps_of(plan));
-    status = ascc_plan_check_inputs(builder, tensor, tap_inputs(plan, term), &term->outputs);
-    term->gathered = (int32_t)taps_of(plan) * tap_inputs(plan, term);
     const double voxel = voxel_of(plan, layer->set);
+    term->gathered = (int32_t)taps_of(plan) * tap_inputs(plan, term);
     term->filter =
         (ascc_filter){.cells = {1, 1, 1}, .radius = voxel * fmax(1.5, sqrt(plan->dimension))};
-    return status == ASCC_OK ? ascc_plan_check_bias(builder, entry, name[ASCC_TENSOR_BIAS])
-                             : status;
+    return ASCC_OK;
 }
 
 /* Corners one voxel away along each axis, none two. */
@@ -286,6 +289,7 @@ static void backward(const ascc_reverse *pass, const ascc_layer *layer, const as
 const ascc_operation ascc_op_stencil = {.name = "stencil",
                                         .type = "stencil",
                                         .read = read_stencil,
+                                        .tensors = tensors,
                                         .check = check,
                                         .lists = lists,
                                         .packed_size = ascc_matrix_packed_size,

@@ -4,6 +4,7 @@
 
 #include "column.h"
 #include "model/cost.h"
+#include "model/initial.h"
 
 #define FAIL(...) ascc_fail(builder->message, ASCC_ERROR_FORMAT, __VA_ARGS__)
 
@@ -41,14 +42,33 @@ static ascc_status find_lengths(ascc_plan_builder *builder, const ascc_layer *la
     return ASCC_OK;
 }
 
+static void tensors(const ascc_plan *plan, ascc_term *term, const size_t *stored,
+                    ascc_tensor_wanted wanted[ASCC_MAX_TENSORS])
+{
+    (void)plan;
+    ascc_plan_want_matrix(term, stored, wanted);
+}
+
 static ascc_status check(ascc_plan_builder *builder, const ascc_layer *layer,
                          ascc_term_entry *entry, const char *const name[ASCC_MAX_TENSORS])
 {
-    ascc_status status = find_lengths(builder, layer, &entry->term);
-    if (status == ASCC_OK && name[ASCC_TENSOR_WEIGHT])
-        status = ascc_plan_check_matrix(builder, entry, name[ASCC_TENSOR_WEIGHT]);
-    return status == ASCC_OK ? ascc_plan_check_bias(builder, entry, name[ASCC_TENSOR_BIAS])
-                             : status;
+    (void)name;
+    return find_lengths(builder, layer, &entry->term);
+}
+
+/* From a finer set a point hears of as many as its voxels hold, else of itself. */
+static void fill_initial(ascc_initial *initial)
+{
+    const ascc_term *term = initial->term;
+    const double ratio = term->option[ASCC_OPTION_VOXEL] /
+                         ascc_initial_spacing(initial->plan, ascc_initial_source(initial));
+    const double hats = initial->plan->dimension == 2 ? ratio * ratio : ratio * ratio * ratio;
+    const bool sums = term->option[ASCC_OPTION_NORMALIZE] == 0.0;
+    if (initial->number == ASCC_TENSOR_WEIGHT)
+        ascc_initial_fill(initial, 0, initial->count,
+                          sqrt(2.0 / term->inputs) / (sums ? fmax(hats, 1.0) : 1.0));
+    else
+        ascc_initial_default(initial);
 }
 
 static int lists(const ascc_plan *plan, const ascc_term *term, int32_t set,
@@ -159,7 +179,9 @@ static void backward(const ascc_reverse *pass, const ascc_layer *layer, const as
 const ascc_operation ascc_op_transfer = {.name = "transfer",
                                          .type = "transfer",
                                          .read = read_transfer,
+                                         .tensors = tensors,
                                          .check = check,
+                                         .initial = fill_initial,
                                          .lists = lists,
                                          .packed_size = ascc_matrix_packed_size,
                                          .pack = ascc_matrix_pack,

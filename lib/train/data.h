@@ -5,6 +5,7 @@
 
 #include <ascc/train.h>
 
+#include "base/random.h"
 #include "model/model.h"
 #include "points/neighbors.h"
 
@@ -34,14 +35,6 @@ ascc_placement ascc_placement_none(void);
 /* to[count][d] = the placed points; vectors are turned only. */
 void ascc_placement_apply(const ascc_placement *placement, int32_t dimension, const float *from,
                           size_t count, bool vectors, double *to);
-
-/* A stream of random numbers that depends on its three numbers alone. */
-typedef struct ascc_random {
-    uint64_t state;
-} ascc_random;
-ascc_random ascc_random_open(uint64_t seed, uint64_t iteration, uint64_t rollout);
-double ascc_random_uniform(ascc_random *random); /* [0, 1) */
-double ascc_random_normal(ascc_random *random);
 
 /* A turn about gravity (without gravity: about any axis), a mirror in a plane along it, and a shift
  * within a cube of this edge. */

@@ -286,9 +286,11 @@ static void add_filter(random_network *n, int level, const char *window)
 {
     model_text_add(&n->text, ",\"radius\":%s",
                    model_number(n->o.spacing * n->o.radius * (double)(1 << level)));
+    const int cells = window ? n->o.cells : n->o.output_cells;
     if (!n->o.bumps)
-        model_text_add(&n->text, ",\"window\":\"%s\",\"mapping\":\"%s\"", window ? window : "peak",
-                       n->o.mapping);
+        model_text_add(&n->text, ",\"window\":\"%s\",\"mapping\":\"%s\",\"cells\":[%d,%d,%d]",
+                       window ? window : "peak", n->o.mapping, cells, cells,
+                       n->o.dimension == 3 ? cells : 1);
     else if (window)
         model_text_add(&n->text, ",\"basis\":{\"bumps\":%d,\"order\":%d}", n->o.bumps, n->o.order);
     else
@@ -303,8 +305,8 @@ static void add_convolution(random_network *n, const char *name, const char *sou
     const int features = strcmp(source, "fluid") == 0 || strcmp(source, "boundary") == 0;
     model_text_add(&n->text,
                    "%s{\"type\":\"convolution\",\"source\":\"%s\",\"relu\":%s,\"column\":%d,"
-                   "\"kernel\":\"%s.kernel\",\"bias\":\"%s.bias\"",
-                   n->terms++ ? "," : "", source, relu ? "true" : "false", column, name, name);
+                   "\"outputs\":%d,\"kernel\":\"%s.kernel\",\"bias\":\"%s.bias\"",
+                   n->terms++ ? "," : "", source, relu ? "true" : "false", column, out, name, name);
     add_filter(n, level, n->o.window);
     if (n->o.relative && features)
         model_text_add(&n->text, ",\"relative\":true");
@@ -332,8 +334,8 @@ static void add_dense(random_network *n, const char *name, const char *source, i
 {
     model_text_add(&n->text,
                    "%s{\"type\":\"dense\",\"source\":\"%s\",\"relu\":%s,\"column\":%d,"
-                   "\"weight\":\"%s.kernel\",\"bias\":\"%s.bias\"}",
-                   n->terms++ ? "," : "", source, relu ? "true" : "false", column, name, name);
+                   "\"outputs\":%d,\"weight\":\"%s.kernel\",\"bias\":\"%s.bias\"}",
+                   n->terms++ ? "," : "", source, relu ? "true" : "false", column, out, name, name);
     add_weights(&n->builder, &n->state, name, n->o.dimension, 0, in, out, n->o.gain);
 }
 
