@@ -796,7 +796,7 @@ static void wrong_bases_and_transfers_are_refused_by_name(void **state)
         {"\"weight\":\"w\"", "\"weight\":\"k\"", "but must have [2, 3]: inputs, outputs"},
         {"\"bumps\":4", "\"bumps\":4,\"order\":1", "'order'"},
         {"\"bumps\":4", "\"bumps\":3", "[4, 2], but must have [3, 2]"},
-        {"\"kernel\":\"o\"", "\"kernel\":\"k\"", "dimensions"},
+        {"\"kernel\":\"o\"", "\"kernel\":\"k\"", "but must have [4, 2]: bumps, inputs"},
         {"\"scale\":[0.01,0.01]", "\"scale\":[0.01,0.02]", "'scale'"},
         {"\"scale\"", "\"projection\":\"radial\",\"scale\"", "'projection'"},
         {"\"scale\"", "\"stored\":\"full\",\"scale\"", "'stored'"},

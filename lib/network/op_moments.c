@@ -41,15 +41,14 @@ static int32_t normal_channel(const ascc_plan *plan)
 static void read_moments(ascc_reader *reader, uint32_t object, const ascc_plan *plan,
                          ascc_term *term, const char *name[ASCC_MAX_TENSORS])
 {
-    (void)plan;
     (void)name;
-    ascc_filter_read_basis(reader, object, &term->filter, true);
+    ascc_filter_read_basis(reader, object, plan->dimension, &term->filter, true);
     if (!ascc_reader_has(reader, object, "walls"))
         return;
     ascc_filter walls = {.radius = 0.0};
     const uint32_t inside = ascc_reader_object(reader, object, "walls");
     if (reader->status == ASCC_OK)
-        ascc_filter_read_basis(reader, inside, &walls, true);
+        ascc_filter_read_basis(reader, inside, plan->dimension, &walls, true);
     ascc_reader_end(reader, inside);
     term->option[OPTION_WALL_BUMPS] = walls.bumps;
     term->option[OPTION_WALL_RADIUS] = walls.radius;
@@ -74,14 +73,8 @@ static ascc_status check(ascc_plan_builder *builder, const ascc_layer *layer,
                     quoted.text);
     if (term->filter.neighbor_limit)
         return FAIL("layer '%s': moments have no 'neighbor_limit'", quoted.text);
-    ascc_status status = ascc_plan_check_filter(builder, &term->filter, quoted.text);
     term->outputs = numbers(plan) * (term->filter.bumps + wall_bumps(term));
-    term->filter.cells[0] = 1;
-    term->filter.cells[1] = term->filter.bumps;
-    term->filter.cells[2] = 1;
-    term->filter.mapping = ASCC_MAPPING_DIRECTION;
-    term->filter.window = ASCC_WINDOW_NONE;
-    return status;
+    return ascc_plan_check_filter(builder, &term->filter, quoted.text);
 }
 
 static int lists(const ascc_plan *plan, const ascc_term *term, int32_t set,
