@@ -14,6 +14,7 @@ typedef struct lesson {
     ascc_model *model;
     ascc_particles *particles;
     ascc_step *step;
+    ascc_train_context *training;
     ascc_trainer *trainer;
     unsigned char *state;
     size_t state_size;
@@ -56,8 +57,11 @@ static void open_lesson(lesson *s, const bench_options *o, size_t count)
     (void)ascc_model_get_info(s->model, &info);
     float *frames = make_frames(count, 4, info.time_step);
     const ascc_training_stage stage = {.end = 1, .horizon = 2, .learning_rate = 1e-3};
-    const ascc_trainer_options options = {
-        .size = sizeof options, .stage = &stage, .stage_count = 1, .batch = 1};
+    const ascc_trainer_options options = {.size = sizeof options,
+                                          .stage = &stage,
+                                          .stage_size = sizeof stage,
+                                          .stage_count = 1,
+                                          .batch = 1};
     const ascc_training_sequence sequence = {.size = sizeof sequence,
                                              .name = "block",
                                              .frame_count = 4,
@@ -65,7 +69,8 @@ static void open_lesson(lesson *s, const bench_options *o, size_t count)
                                              .position = frames,
                                              .time_step = info.time_step};
     const void *bytes = ascc_model_bytes(s->model, &size);
-    if (ascc_trainer_create(&options, bytes, size, &s->trainer) ||
+    if (ascc_train_context_create(NULL, &s->training) ||
+        ascc_trainer_create(s->training, &options, bytes, size, &s->trainer) ||
         ascc_trainer_add_sequence(s->trainer, &sequence))
         bench_fail("trainer: %s", ascc_trainer_message(s->trainer));
     s->gradient = malloc(ascc_trainer_parameter_count(s->trainer) * sizeof *s->gradient);
@@ -86,6 +91,7 @@ static void open_lesson(lesson *s, const bench_options *o, size_t count)
 static void close_lesson(lesson *s)
 {
     ascc_trainer_destroy(&s->trainer);
+    ascc_train_context_destroy(&s->training);
     ascc_step_destroy(&s->step);
     ascc_particles_destroy(&s->particles);
     ascc_model_destroy(&s->model);

@@ -57,10 +57,12 @@ static int write_network(char *text, size_t capacity, int dimension, double spac
         "\\\"terms\\\":[{\\\"type\\\":\\\"identity\\\",\\\"source\\\":\\\"fluid\\\"},"
         "{\\\"type\\\":\\\"identity\\\",\\\"source\\\":\\\"boundary\\\"}]}],"
         "\\\"output\\\":{\\\"type\\\":\\\"antisymmetric\\\",\\\"source\\\":\\\"ones\\\","
-        "\\\"kernel\\\":\\\"repulsion\\\",\\\"stored\\\":\\\"full\\\",\\\"radius\\\":%s,"
+        "\\\"kernel\\\":\\\"repulsion\\\",\\\"stored\\\":\\\"full\\\",\\\"cells\\\":[%d,%d,%d],"
+        "\\\"radius\\\":%s,"
         "\\\"window\\\":\\\"peak\\\",\\\"mapping\\\":\\\"identity\\\","
         "\\\"projection\\\":\\\"radial\\\",\\\"scale\\\":%s}}",
-        dimension, dimension, dt, g, dimension == 3 ? ",0" : "", h, reach, h);
+        dimension, dimension, dt, g, dimension == 3 ? ",0" : "", h, CELLS, CELLS,
+        dimension == 3 ? CELLS : 1, reach, h);
 }
 
 /* Component `axis` of the kernel at grid coordinates n, odd integers within +-(CELLS - 1). */

@@ -13,6 +13,7 @@
 static char folder[64], path[128];
 static ascc_context *context;
 static ascc_model *model;
+static ascc_train_context *train;
 static ascc_trainer *trainer;
 static char message[256];
 
@@ -31,14 +32,14 @@ static int open_all(void **state)
     const ascc_training_stage stage = {.end = 10, .horizon = 1, .learning_rate = 0.001};
     const ascc_trainer_options options = {.size = sizeof options,
                                           .stage = &stage,
+                                          .stage_size = sizeof stage,
                                           .stage_count = 1,
-                                          .batch = 1,
-                                          .message = message,
-                                          .message_size = sizeof message};
+                                          .batch = 1};
     assert_int_equal(ascc_context_create(NULL, &context), ASCC_OK);
     assert_int_equal(ascc_model_load_memory(context, bytes, size, &model), ASCC_OK);
-    if (ascc_trainer_create(&options, bytes, size, &trainer) != ASCC_OK)
-        fail_msg("%s", message);
+    if (ascc_train_context_create(NULL, &train) != ASCC_OK ||
+        ascc_trainer_create(train, &options, bytes, size, &trainer) != ASCC_OK)
+        fail_msg("no trainer");
     free(bytes);
     return 0;
 }
@@ -47,6 +48,7 @@ static int close_all(void **state)
 {
     (void)state;
     ascc_trainer_destroy(&trainer);
+    ascc_train_context_destroy(&train);
     ascc_model_destroy(&model);
     ascc_context_destroy(&context);
     (void)remove(path);

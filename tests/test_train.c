@@ -1,7 +1,6 @@
 /* The trainer's gradients against central differences of the oracle, and what it promises besides.
  * SPDX-License-Identifier: MIT */
 #include <ascc/train.h>
-#include <errno.h>
 #include <math.h>
 #include <unistd.h>
 
@@ -86,26 +85,37 @@ static ascc_trainer_options default_options(void)
                                   .seed = 3,
                                   .batch = 3,
                                   .stage = &only_stage,
+                                  .stage_size = sizeof only_stage,
                                   .stage_count = 1,
                                   .position_gradients = 1};
 }
 
-static ascc_trainer *open_trainer(const ascc_trainer_options *options, const model_random *random,
-                                  const motion *m)
+/* With so many threads. */
+static ascc_trainer *open_threaded(int32_t threads, const ascc_trainer_options *options,
+                                   const model_random *random, const motion *m)
 {
     char message[256] = "";
-    ascc_trainer_options o = *options;
+    const ascc_context_options wanted = {.size = sizeof wanted, .thread_count = threads};
+    ascc_train_context *train = NULL;
     ascc_trainer *trainer = NULL;
     size_t size;
     unsigned char *bytes = model_builder_random(random, &size);
-    o.message = message;
-    o.message_size = sizeof message;
-    if (ascc_trainer_create(&o, bytes, size, &trainer) != ASCC_OK)
+    assert_int_equal(ascc_train_context_create(&wanted, &train), ASCC_OK);
+    const ascc_status status = ascc_trainer_create(train, options, bytes, size, &trainer);
+    ascc_train_context_message(train, message, sizeof message);
+    ascc_train_context_destroy(&train); /* the trainer lives on */
+    if (status != ASCC_OK)
         fail_msg("trainer: %s", message);
     free(bytes);
     if (m && ascc_trainer_add_sequence(trainer, &m->sequence) != ASCC_OK)
         fail_msg("sequence: %s", ascc_trainer_message(trainer));
     return trainer;
+}
+
+static ascc_trainer *open_trainer(const ascc_trainer_options *options, const model_random *random,
+                                  const motion *m)
+{
+    return open_threaded(1, options, random, m);
 }
 
 /* The parameters, from malloc. */
@@ -369,13 +379,12 @@ static void gradients_of_penalties_are_right(void **state)
 
 /* ---- Promises ---- */
 
-static ascc_trainer_options augmented(int32_t threads)
+static ascc_trainer_options augmented(void)
 {
     static const ascc_training_stage stages[2] = {
         {.end = 3, .horizon = 1, .learning_rate = 1e-3, .learning_rate_end = 5e-4},
         {.end = 1000, .horizon = 2, .presteps = 2, .learning_rate = 5e-4}};
     ascc_trainer_options o = default_options();
-    o.thread_count = threads;
     o.stage = stages;
     o.stage_count = 2;
     o.batch = 4;
@@ -407,10 +416,11 @@ static void same_seed_gives_the_same_weights_for_any_threads(void **state)
     for (int v = 0; v < 2; v++) {
         const model_random random = everything(21, 2 + v);
         motion *m = make_motion(5, 2 + v);
-        ascc_trainer_options one = augmented(1), two = augmented(2), other = augmented(1);
+        ascc_trainer_options one = augmented(), two = augmented(), other = augmented();
         other.seed++;
         two.memory_limit = (size_t)v; /* and for any memory */
-        ascc_trainer *a = open_trainer(&one, &random, m), *b = open_trainer(&two, &random, m);
+        ascc_trainer *a = open_trainer(&one, &random, m);
+        ascc_trainer *b = open_threaded(2, &two, &random, m);
         ascc_trainer *c = open_trainer(&other, &random, m);
         float *before = parameters_of(a);
         iterate(a, 5);
@@ -431,45 +441,6 @@ static void same_seed_gives_the_same_weights_for_any_threads(void **state)
     }
 }
 
-/* Allocations that still succeed; negative: all do. */
-static int allocations_until_failure = -1;
-
-int __real_posix_memalign(void **memory, size_t alignment, size_t size);
-int __wrap_posix_memalign(void **memory, size_t alignment, size_t size);
-
-int __wrap_posix_memalign(void **memory, size_t alignment, size_t size)
-{
-    if (allocations_until_failure == 0)
-        return ENOMEM;
-    if (allocations_until_failure > 0)
-        allocations_until_failure--;
-    return __real_posix_memalign(memory, alignment, size);
-}
-
-static void creation_without_memory_says_so(void **state)
-{
-    (void)state;
-    size_t size;
-    const model_random random = small(5, 2);
-    unsigned char *bytes = model_builder_random(&random, &size);
-    ascc_trainer_options o = augmented(1);
-    char message[256];
-    o.message = message;
-    o.message_size = sizeof message;
-    for (int n = 0; n < 6; n++) {
-        ascc_trainer *trainer = NULL;
-        message[0] = '\0';
-        allocations_until_failure = n;
-        const ascc_status status = ascc_trainer_create(&o, bytes, size, &trainer);
-        allocations_until_failure = -1;
-        assert_int_equal(status, ASCC_ERROR_MEMORY);
-        assert_null(trainer);
-        if (!strstr(message, "no memory"))
-            fail_msg("allocation %d: '%s'", n, message);
-    }
-    free(bytes);
-}
-
 /* In one of the host's floating point environments; false: it failed, or left another one. */
 #define IN_MODE(mode, call)                                                                        \
     (float_state_set(mode), kept = (call) == ASCC_OK && float_state() == (mode),                   \
@@ -485,17 +456,21 @@ static void the_hosts_floating_point_environment_changes_no_weight(void **state)
     motion *m = make_motion(8, 2);
     size_t size;
     unsigned char *bytes = model_builder_random(&random, &size);
-    const ascc_trainer_options one = augmented(1), two = augmented(2);
-    ascc_trainer *right = open_trainer(&one, &random, m);
+    const ascc_trainer_options options = augmented();
+    ascc_trainer *right = open_trainer(&options, &random, m);
     iterate(right, 2);
     float *values = parameters_of(right);
     for (size_t i = 0; i < 2 * FLOAT_MODE_COUNT; i++) {
         const uint64_t mode = float_modes[i / 2].state;
+        const ascc_context_options threads = {.size = sizeof threads,
+                                              .thread_count = 1 + (int32_t)(i % 2)};
+        ascc_train_context *train = NULL;
         ascc_trainer *t;
         ascc_training_report report = {.size = sizeof report};
         double loss;
         bool kept;
-        assert_true(IN_MODE(mode, ascc_trainer_create(i % 2 ? &two : &one, bytes, size, &t)));
+        assert_true(IN_MODE(mode, ascc_train_context_create(&threads, &train)));
+        assert_true(IN_MODE(mode, ascc_trainer_create(train, &options, bytes, size, &t)));
         assert_true(IN_MODE(mode, ascc_trainer_add_sequence(t, &m->sequence)));
         assert_true(IN_MODE(mode, ascc_trainer_gradient(t, 0, 1, 0, 1, &loss, NULL)));
         assert_true(IN_MODE(mode, ascc_trainer_iterate(t, &report)));
@@ -506,6 +481,7 @@ static void the_hosts_floating_point_environment_changes_no_weight(void **state)
         assert_true(IN_MODE(mode, ascc_trainer_get_parameters(t, values)));
         assert_true(IN_MODE(mode, ascc_trainer_set_parameters(t, values)));
         ascc_trainer_destroy(&t);
+        ascc_train_context_destroy(&train);
     }
     remove(path);
     free(values);
@@ -522,8 +498,9 @@ static void going_on_from_a_saved_state_gives_the_same_bits(void **state)
     assert_true(file >= 0);
     const model_random random = everything(22, 2), another = small(22, 2);
     motion *m = make_motion(6, 2);
-    const ascc_trainer_options o = augmented(2);
-    ascc_trainer *a = open_trainer(&o, &random, m), *b = open_trainer(&o, &random, m);
+    const ascc_trainer_options o = augmented();
+    ascc_trainer *a = open_threaded(2, &o, &random, m);
+    ascc_trainer *b = open_threaded(2, &o, &random, m);
     ascc_trainer *c = open_trainer(&o, &another, m);
     iterate(a, 3);
     assert_int_equal(ascc_trainer_save(a, path), ASCC_OK);
@@ -857,7 +834,6 @@ int main(void)
         cmocka_unit_test(gradients_with_positions_as_constants_are_right),
         cmocka_unit_test(gradients_of_penalties_are_right),
         cmocka_unit_test(same_seed_gives_the_same_weights_for_any_threads),
-        cmocka_unit_test(creation_without_memory_says_so),
         cmocka_unit_test(the_hosts_floating_point_environment_changes_no_weight),
         cmocka_unit_test(going_on_from_a_saved_state_gives_the_same_bits),
         cmocka_unit_test(a_sequence_with_a_nan_is_refused_by_name),

@@ -98,7 +98,10 @@ wrong "network: 'dimension' is 4" 's/"dimension": 2/"dimension": 4/'
 wrong "network: 'kernel' does not understand 'mesh'" 's/"channels": 4,/"kernel": "mesh",/'
 wrong "contact is within 0 and wall_radius" 's/"channels": 4,/"contact": 9,/'
 wrong "projection is for kernel grid" 's/"channels": 4,/"projection": "radial",/'
-wrong "'network' or 'model' is wanted" 's/"network"/"networks"/'
+wrong "'network', 'description' or 'model' is wanted" 's/"network"/"networks"/'
+wrong "config: 'description' must be a text" 's/"batch"/"description": 1, "batch"/;s/"network"/"nothing"/'
+wrong "config: 'network' and 'description' exclude each other" 's/"batch"/"description": "d.json", "batch"/'
+wrong "d.json: No such file" 's/"batch"/"description": "d.json", "batch"/;s/"network"/"nothing"/'
 wrong "stage 2: 'horizon' is 0" 's/"horizon": 2/"horizon": 0/'
 wrong "stage 1: unknown key 'rate'" 's/"learning_rate_end"/"rate"/'
 wrong "data: train: *_0009.safetensors: there is no such file" 's|data/[*]_0000|*_0009|'
@@ -154,6 +157,22 @@ equals() {
         cmp whole.rows "$1.rows" >out 2>err
     report $? "$2"
 }
+
+# ---- A description in place of an architecture ----
+
+network=$(tail -c +9 whole/m.safetensors | head -c 8192 |
+    LC_ALL=C sed -n 's/.*"network":"\(.*\)","initial_weights.*/\1/p' | sed 's/\\"/"/g')
+printf '%s' "$network" >described.network
+config described.json described '/"network": {/,/},/d'
+sed '1a "description": "described.network",' described.json >changed && mv changed described.json
+run train described.json --threads 1
+equals described 'a description trains as the architecture that makes it'
+config inside.json inside '/"network": {/,/},/d'
+{
+    printf '{"description": ' && cat described.network && printf ',' && tail -n +2 inside.json
+} >changed && mv changed inside.json
+run train inside.json --threads 1 --iterations 1
+report $? 'a description may stand in the config itself'
 
 config threads.json threads
 run train threads.json --threads 3

@@ -1,10 +1,4 @@
-/* Writes model files of random weights.
- * SPDX-License-Identifier: MIT
- *
- * A weight's size: a layer's value should be about 1 where what it reads is. A column of a convolution
- * (bump k, harmonic m) sums over neighbours; with s what that sum is about, weights have the deviation
- * 1 / (s sqrt(inputs columns)).
- */
+/* Writes the description of a network from a few numbers. SPDX-License-Identifier: MIT */
 #include "architecture.h"
 
 #include <math.h>
@@ -20,8 +14,6 @@ const char *const ascc_architecture_samplings[3] = {"centers", "corners", "farth
 const char *const ascc_architecture_evaluates[2] = {"current", "advected"};
 const char *const ascc_architecture_directions[2] = {"current", "seen"};
 
-static const double PI = 3.14159265358979323846;
-static const double FILL = 0.7; /* of the neighbours inside a lattice: fluids have surfaces */
 static const double COARSE_RADIUS = 2.25; /* voxels */
 static const double SCALE = 0.05;         /* of the output, spacings */
 
@@ -107,129 +99,19 @@ static void add_escaped(bytes *b, const char *text)
     }
 }
 
-/* ---- The file being written --------------------------------------------------------------------- */
-
 typedef struct writer {
     const ascc_architecture *a;
-    bytes network, tensors, data;
+    bytes network;
     bool layers; /* there is one already */
     bool terms;  /* of the layer being written */
 } writer;
 
-/* splitmix64 */
-static uint64_t next_random(uint64_t *state)
-{
-    uint64_t z = *state += 0x9e3779b97f4a7c15u;
-    z = (z ^ z >> 30) * 0xbf58476d1ce4e5b9u;
-    z = (z ^ z >> 27) * 0x94d049bb133111ebu;
-    return z ^ z >> 31;
-}
-
-/* Close to normal: a sum of twelve, which has the same bits everywhere. */
-static double normal(uint64_t *state)
-{
-    double sum = -6.0;
-    for (int i = 0; i < 12; i++)
-        sum += (double)(next_random(state) >> 11) * 0x1p-53;
-    return sum;
-}
-
-/* A tensor of shape [columns][rest ...], random from its own name, with the deviation of each column. */
-static void add_tensor(writer *w, const char *name, int rank, const size_t *shape, size_t columns,
-                       const double *deviation, bool positive)
-{
-    size_t count = 1;
-    const size_t begin = w->data.length;
-    uint64_t state = w->a->seed * 0xd1342543de82ef95u;
-    for (const char *c = name; *c; c++)
-        state = (state ^ (unsigned char)*c) * 0x100000001b3u;
-    add(&w->tensors, ",\"%s\":{\"dtype\":\"F32\",\"shape\":[", name);
-    for (int i = 0; i < rank; i++) {
-        add(&w->tensors, "%s%zu", i ? "," : "", shape[i]);
-        count *= shape[i];
-    }
-    for (size_t i = 0; i < count && grow(&w->data, 5); i++) {
-        const double random = deviation[i / (count / columns)] * normal(&state) + 0.0;
-        const float value = (float)(positive ? fabs(random) : random);
-        uint32_t bits;
-        memcpy(&bits, &value, sizeof bits);
-        const unsigned char little[4] = {(unsigned char)bits, (unsigned char)(bits >> 8),
-                                         (unsigned char)(bits >> 16), (unsigned char)(bits >> 24)};
-        put(&w->data, little, sizeof little);
-    }
-    add(&w->tensors, "],\"data_offsets\":[%zu,%zu]}", begin, w->data.length);
-}
-
-static void add_plain_tensor(writer *w, const char *name, int rank, const size_t *shape,
-                             double size)
-{
-    add_tensor(w, name, rank, shape, 1, &size, false);
-}
-
-static void add_bias(writer *w, const char *name, int32_t outputs, double size)
-{
-    const size_t shape[1] = {(size_t)outputs};
-    add(&w->network, ",\"bias\":\"%s.bias\"", name);
-    char text[80];
-    (void)snprintf(text, sizeof text, "%s.bias", name);
-    add_plain_tensor(w, text, 1, shape, size);
-}
-
-/* ---- How large the columns of a basis are -------------------------------------------------------- */
-
-/* Neighbours that a convolution sums over: a lattice around the point, or the plane of a wall. */
-typedef struct neighborhood {
-    int32_t dimension, bumps, order;
-    double radius;  /* spacings of the source's own lattice */
-    bool self;      /* the point is one of them */
-    bool wall;      /* a plane */
-    double members; /* sqrt(inputs columns) and what else divides */
-} neighborhood;
-
-static double bump(int32_t k, int32_t bumps, double rho)
-{
-    const double t = bumps * rho - k;
-    return fabs(t) < 1.0 ? (1.0 - t * t) * (1.0 - t * t) : 0.0;
-}
-
-static int32_t harmonics(int32_t dimension, int32_t order)
-{
-    return dimension == 2 ? 2 * order + 1 : (order + 1) * (order + 1);
-}
-
-/* Sum over neighbours of bump^power. */
-static double bump_sum(const neighborhood *n, int32_t k, int power)
-{
-    enum { SLICES = 400 };
-    double sum = 0.0;
-    const double away = n->wall ? 0.25 * n->radius : 0.0; /* of the plane */
-    for (int i = 0; i < SLICES; i++) {
-        const double r = n->radius * (i + 0.5) / SLICES, dr = n->radius / SLICES;
-        const bool flat = n->wall || n->dimension == 2; /* rings, else shells */
-        const double phi = bump(k, n->bumps, sqrt(r * r + away * away) / n->radius);
-        const double area = n->wall && n->dimension == 2 ? 2.0
-                            : flat                       ? 2.0 * PI * r
-                                                         : 4.0 * PI * r * r;
-        sum += area * dr * (power == 2 ? phi * phi : phi);
-    }
-    return (n->wall ? 2.5 : FILL) * sum; /* walls are sampled densely, or in layers */
-}
-
-static double basis_deviation(const neighborhood *n, size_t column)
-{
-    const int32_t count = harmonics(n->dimension, n->order), k = (int32_t)column / count;
-    const int32_t m = (int32_t)column % count;
-    double s;
-    if (m == 0)
-        s = bump_sum(n, k, 1) + (n->self && k == 0 ? 1.0 : 0.0);
-    else if (n->wall)
-        s = 0.5 * bump_sum(n, k, 1); /* walls lie on one side */
-    else
-        s = sqrt(bump_sum(n, k, 2) / n->dimension);
-    return 1.0 / (n->members * fmax(s, 1.0));
-}
-
 /* ---- Layers and terms ---------------------------------------------------------------------------- */
+
+static double voxel_of(const ascc_architecture *a, int32_t level)
+{
+    return a->spacing * (double)(1 << level);
+}
 
 static void begin_layer(writer *w, const char *name, const char *points, int32_t channels)
 {
@@ -246,50 +128,32 @@ static void begin_term(writer *w, const char *type, const char *source, bool rel
     w->terms = true;
 }
 
+static void add_bias(writer *w, const char *name)
+{
+    add(&w->network, ",\"bias\":\"%s.bias\"", name);
+}
+
 typedef struct convolution {
     const char *name, *source;
-    bool relu, relative, wall;
-    bool self; /* source and layer are one set */
-    int32_t inputs, outputs, bumps;
-    double radius;     /* m */
-    double voxel;      /* m, spacing of the source's points */
-    double gain, bias; /* bias < 0: none */
+    bool relu, relative, bias;
+    int32_t bumps;
+    double radius; /* m */
 } convolution;
 
 static void add_convolution(writer *w, const convolution *c)
 {
-    char name[80];
-    const ascc_architecture *a = w->a;
-    const int32_t count = harmonics(a->dimension, a->order);
-    const size_t shape[4] = {(size_t)c->bumps, (size_t)count, (size_t)c->inputs,
-                             (size_t)c->outputs};
-    const neighborhood n = {.dimension = a->dimension,
-                            .bumps = c->bumps,
-                            .order = a->order,
-                            .radius = c->radius / c->voxel,
-                            .self = c->self,
-                            .wall = c->wall,
-                            .members = sqrt((double)c->inputs * c->bumps * count) / c->gain};
     begin_term(w, "convolution", c->source, c->relu);
-    (void)snprintf(name, sizeof name, "%s.kernel", c->name);
-    add(&w->network, ",\"kernel\":\"%s\"", name);
-    double size[ASCC_ARCHITECTURE_BUMPS * 9];
-    for (size_t i = 0; i < shape[0] * shape[1]; i++)
-        size[i] = basis_deviation(&n, i);
-    add_tensor(w, name, 4, shape, shape[0] * shape[1], size, false);
-    if (c->bias >= 0.0)
-        add_bias(w, c->name, c->outputs, c->bias);
+    add(&w->network, ",\"kernel\":\"%s.kernel\"", c->name);
+    if (c->bias)
+        add_bias(w, c->name);
     add(&w->network, ",\"radius\":%.9g,\"basis\":{\"bumps\":%d,\"order\":%d}%s}", c->radius,
-        c->bumps, a->order, c->relative ? ",\"relative\":true" : "");
+        c->bumps, w->a->order, c->relative ? ",\"relative\":true" : "");
 }
 
-static void add_dense(writer *w, const char *name, const char *source, bool relu, int32_t inputs,
-                      int32_t outputs)
+static void add_dense(writer *w, const char *name, const char *source, bool relu)
 {
-    const size_t shape[2] = {(size_t)inputs, (size_t)outputs};
     begin_term(w, "dense", source, relu);
     add(&w->network, ",\"weight\":\"%s\"}", name);
-    add_plain_tensor(w, name, 2, shape, sqrt((relu ? 2.0 : 1.0) / inputs));
 }
 
 static void add_identity(writer *w, const char *source)
@@ -298,54 +162,27 @@ static void add_identity(writer *w, const char *source)
     add(&w->network, "}");
 }
 
-/* Between two sets of the BASIS family: a transfer, or a convolution where transfers cannot go. */
-typedef struct crossing {
-    const char *name, *source;
-    int32_t inputs, outputs;
-    double voxel; /* of the coarser of the two, m */
-    double source_voxel;
-    double hats; /* what hats sum to around a point */
-    bool relu;
-} crossing;
-
-static void add_crossing(writer *w, const crossing *c)
+/* Between two sets of the BASIS family: a transfer, or a convolution where transfers cannot go. level: the
+ * coarser of the two. */
+static void add_crossing(writer *w, const char *name, const char *source, int32_t level, bool relu)
 {
-    const size_t shape[2] = {(size_t)c->inputs, (size_t)c->outputs};
-    char name[80];
     if (w->a->sampling == ASCC_SAMPLE_FARTHEST) {
-        add_convolution(w, &(convolution){.name = c->name,
-                                          .source = c->source,
-                                          .relu = c->relu,
-                                          .inputs = c->inputs,
-                                          .outputs = c->outputs,
+        add_convolution(w, &(convolution){.name = name,
+                                          .source = source,
+                                          .relu = relu,
                                           .bumps = w->a->bumps,
-                                          .radius = COARSE_RADIUS * c->voxel,
-                                          .voxel = c->source_voxel,
-                                          .gain = 0.5,
-                                          .bias = -1.0});
+                                          .radius = COARSE_RADIUS * voxel_of(w->a, level)});
         return;
     }
-    begin_term(w, "transfer", c->source, c->relu);
-    (void)snprintf(name, sizeof name, "%s.weight", c->name);
-    add(&w->network, ",\"weight\":\"%s\"}", name);
-    add_plain_tensor(w, name, 2, shape, sqrt(2.0 / c->inputs) / c->hats);
+    begin_term(w, "transfer", source, relu);
+    add(&w->network, ",\"weight\":\"%s.weight\"}", name);
 }
 
 /* ---- The BASIS family ---------------------------------------------------------------------------- */
 
-static double voxel_of(const ascc_architecture *a, int32_t level)
-{
-    return a->spacing * (double)(1 << level);
-}
-
 static int32_t channels_of(const ascc_architecture *a, int32_t level)
 {
     return level ? a->coarse_channels[level - 1] : a->channels;
-}
-
-static int32_t wall_channels(const ascc_architecture *a)
-{
-    return 1 + 2 * a->dimension; /* one, normal, motion */
 }
 
 static void points_of(int32_t level, const char *fine, char text[16])
@@ -357,8 +194,7 @@ static void points_of(int32_t level, const char *fine, char text[16])
 }
 
 /* Walls as a particle sees them, or as a level does. */
-static void add_wall_convolution(writer *w, const char *layer, int32_t level, int32_t outputs,
-                                 double gain)
+static void add_wall_convolution(writer *w, const char *layer, int32_t level)
 {
     const ascc_architecture *a = w->a;
     char name[64];
@@ -366,29 +202,9 @@ static void add_wall_convolution(writer *w, const char *layer, int32_t level, in
     add_convolution(w, &(convolution){.name = name,
                                       .source = "boundary",
                                       .relative = level == 0,
-                                      .wall = true,
-                                      .inputs = wall_channels(a),
-                                      .outputs = outputs,
                                       .bumps = level ? a->bumps : a->wall_bumps,
                                       .radius = level ? COARSE_RADIUS * voxel_of(a, level)
-                                                      : a->wall_radius * a->spacing,
-                                      .voxel = a->spacing,
-                                      .gain = gain,
-                                      .bias = -1.0});
-}
-
-/* The walls' share of a level's first layer: coarser ones hear of them from there. */
-static void add_wall_transfer(writer *w, const char *layer, int32_t channels)
-{
-    char name[64];
-    (void)snprintf(name, sizeof name, "%s.walls", layer);
-    add_crossing(w, &(crossing){.name = name,
-                                .source = "boundary",
-                                .inputs = wall_channels(w->a),
-                                .outputs = channels,
-                                .voxel = voxel_of(w->a, 1),
-                                .source_voxel = w->a->spacing,
-                                .hats = (double)(1 << w->a->dimension)});
+                                                      : a->wall_radius * a->spacing});
 }
 
 static void first_layer(writer *w)
@@ -398,39 +214,28 @@ static void first_layer(writer *w)
     add_convolution(w, &(convolution){.name = "l0.fluid",
                                       .source = "fluid",
                                       .relative = true,
-                                      .self = true,
-                                      .inputs = 1 + (a->gravity_seen ? 2 : 1) * a->dimension,
-                                      .outputs = a->channels,
+                                      .bias = true,
                                       .bumps = a->bumps,
-                                      .radius = a->radius * a->spacing,
-                                      .voxel = a->spacing,
-                                      .gain = 1.0,
-                                      .bias = 0.1});
-    add_wall_convolution(w, "l0", 0, a->channels, 1.0);
+                                      .radius = a->radius * a->spacing});
+    add_wall_convolution(w, "l0", 0);
 }
 
 /* A layer that reads the one before it on the same set: convolution + dense + identity. */
 static void same_layer(writer *w, const char *name, const char *source, int32_t level)
 {
     const ascc_architecture *a = w->a;
-    const int32_t channels = channels_of(a, level);
     char points[16], part[64];
     points_of(level, "fluid", points);
-    begin_layer(w, name, points, channels);
+    begin_layer(w, name, points, channels_of(a, level));
     add_convolution(
         w, &(convolution){.name = name,
                           .source = source,
                           .relu = true,
-                          .self = true,
-                          .inputs = channels,
-                          .outputs = channels,
+                          .bias = true,
                           .bumps = a->bumps,
-                          .radius = (level ? COARSE_RADIUS : a->radius) * voxel_of(a, level),
-                          .voxel = voxel_of(a, level),
-                          .gain = 1.0,
-                          .bias = 0.0});
+                          .radius = (level ? COARSE_RADIUS : a->radius) * voxel_of(a, level)});
     (void)snprintf(part, sizeof part, "%s.dense", name);
-    add_dense(w, part, source, true, channels, channels);
+    add_dense(w, part, source, true);
     add_identity(w, source);
 }
 
@@ -439,24 +244,18 @@ static void same_layer(writer *w, const char *name, const char *source, int32_t 
 static void go_down(writer *w, int32_t level, const char *source, char last[32])
 {
     const ascc_architecture *a = w->a;
-    const int32_t channels = channels_of(a, level);
     char points[16], name[32], part[64];
     points_of(level, "fluid", points);
     (void)snprintf(name, sizeof name, "d%d", level);
     (void)snprintf(part, sizeof part, "%s.down", name);
-    begin_layer(w, name, points, channels);
-    add_crossing(w, &(crossing){.name = part,
-                                .source = source,
-                                .inputs = channels_of(a, level - 1),
-                                .outputs = channels,
-                                .voxel = voxel_of(a, level),
-                                .source_voxel = voxel_of(a, level - 1),
-                                .hats = (double)(1 << a->dimension),
-                                .relu = true});
-    if (a->sampling == ASCC_SAMPLE_FARTHEST)
-        add_wall_convolution(w, name, level, channels, 1.0);
-    else if (level == 1)
-        add_wall_transfer(w, name, channels);
+    begin_layer(w, name, points, channels_of(a, level));
+    add_crossing(w, part, source, level, true);
+    if (a->sampling == ASCC_SAMPLE_FARTHEST) {
+        add_wall_convolution(w, name, level);
+    } else if (level == 1) { /* coarser ones hear of the walls from there */
+        (void)snprintf(part, sizeof part, "%s.walls", name);
+        add_crossing(w, part, "boundary", level, false);
+    }
     for (int32_t k = 1; k <= a->coarse_layers; k++) {
         char next[32];
         (void)snprintf(next, sizeof next, "c%d_%d", level, k);
@@ -468,31 +267,22 @@ static void go_down(writer *w, int32_t level, const char *source, char last[32])
 
 static void add_up(writer *w, const char *layer, int32_t level, const char *source)
 {
-    const ascc_architecture *a = w->a;
     char part[64];
     (void)snprintf(part, sizeof part, "%s.up", layer);
-    add_crossing(w, &(crossing){.name = part,
-                                .source = source,
-                                .inputs = channels_of(a, level + 1),
-                                .outputs = channels_of(a, level),
-                                .voxel = voxel_of(a, level + 1),
-                                .source_voxel = voxel_of(a, level + 1),
-                                .hats = 1.0,
-                                .relu = true});
+    add_crossing(w, part, source, level + 1, true);
 }
 
 /* From `source`, one level coarser, to layers u and v on `level`, beside `own`, the last on the way
  * down. */
 static void go_up(writer *w, int32_t level, const char *source, const char *own, char last[32])
 {
-    const int32_t channels = channels_of(w->a, level);
     char points[16], name[32], part[64];
     points_of(level, "fluid", points);
     (void)snprintf(name, sizeof name, "u%d", level);
     (void)snprintf(part, sizeof part, "%s.dense", name);
-    begin_layer(w, name, points, channels);
+    begin_layer(w, name, points, channels_of(w->a, level));
     add_up(w, name, level, source);
-    add_dense(w, part, own, true, channels, channels);
+    add_dense(w, part, own, true);
     add_identity(w, own);
     (void)snprintf(last, 32, "v%d", level);
     same_layer(w, last, name, level);
@@ -527,31 +317,18 @@ static void plain_output(writer *w, const char *last)
     add_convolution(w, &(convolution){.name = "correction.fluid",
                                       .source = last,
                                       .relu = true,
-                                      .self = true,
-                                      .inputs = a->channels,
-                                      .outputs = a->dimension,
+                                      .bias = true,
                                       .bumps = a->bumps,
-                                      .radius = a->radius * a->spacing,
-                                      .voxel = a->spacing,
-                                      .gain = 0.01,
-                                      .bias = 0.0});
-    add_wall_convolution(w, "correction", 0, a->dimension, 0.01);
+                                      .radius = a->radius * a->spacing});
+    add_wall_convolution(w, "correction", 0);
     end_plain(w);
 }
 
-static void output_kernels(writer *w, const char *prefix, int32_t bumps)
+static void output_kernels(writer *w, const char *prefix)
 {
-    const size_t shape[2] = {(size_t)bumps, (size_t)w->a->channels};
-    const double strength = 0.02, damping = 0.05;
-    char name[64];
-    (void)snprintf(name, sizeof name, "%s.kernel", prefix);
-    add(&w->network, "\"kernel\":\"%s\"", name);
-    add_tensor(w, name, 2, shape, 1, &strength, false);
-    if (!w->a->damping)
-        return;
-    (void)snprintf(name, sizeof name, "%s.damping", prefix);
-    add(&w->network, ",\"damping\":\"%s\"", name);
-    add_tensor(w, name, 2, shape, 1, &damping, true);
+    add(&w->network, "\"kernel\":\"%s.kernel\"", prefix);
+    if (w->a->damping)
+        add(&w->network, ",\"damping\":\"%s.damping\"", prefix);
 }
 
 static void central_output(writer *w, const char *last)
@@ -562,12 +339,12 @@ static void central_output(writer *w, const char *last)
         "\"radius\":%.9g,\"basis\":{\"bumps\":%d},",
         last, SCALE * a->spacing,
         (a->output_radius > 0.0 ? a->output_radius : a->radius) * a->spacing, a->output_bumps);
-    output_kernels(w, "output", a->output_bumps);
+    output_kernels(w, "output");
     if (a->impulse_limit > 0.0)
         add(&w->network, ",\"limit\":%.9g", a->impulse_limit * a->spacing);
     add(&w->network, ",\"walls\":{\"radius\":%.9g,\"basis\":{\"bumps\":%d},",
         a->wall_radius * a->spacing, a->wall_bumps);
-    output_kernels(w, "output.walls", a->wall_bumps);
+    output_kernels(w, "output.walls");
     if (a->contact > 0.0)
         add(&w->network, ",\"contact\":%.9g", a->contact * a->spacing);
     add(&w->network, "}%s}", a->advected && !a->seen_direction ? ",\"direction\":\"current\"" : "");
@@ -600,63 +377,54 @@ static void basis_network(writer *w)
 
 /* ---- The GRID family ----------------------------------------------------------------------------- */
 
+/* Cells along each axis of a filter. */
+static void add_cells(writer *w, int32_t cells)
+{
+    add(&w->network, ",\"cells\":[%d,%d,%d]", cells, cells, w->a->dimension == 2 ? 1 : cells);
+}
+
 typedef struct grid_term {
     const char *name, *source;
     bool relu;
-    int32_t column, inputs, outputs;
+    int32_t column, outputs;
     int32_t level; /* the coarser of source and layer */
-    double gain;
 } grid_term;
 
 /* A filter of the paper: cells along each axis, the ball mapped to the cube keeping volumes. */
 static void add_grid_convolution(writer *w, const grid_term *t)
 {
     const ascc_architecture *a = w->a;
-    const bool flat = a->dimension == 2;
-    const size_t cells = flat ? 8 : 4, depth = flat ? 1 : 4;
-    const size_t shape[5] = {depth, cells, cells, (size_t)t->inputs, (size_t)t->outputs};
-    const double r = a->radius, count = FILL * (flat ? PI * r * r : 4.0 / 3.0 * PI * r * r * r);
-    const double window = flat ? 1.0 / 4.0 : 16.0 / 105.0; /* mean of poly6 over the ball */
-    const double seen = 1.0 + count * window;              /* neighbours by window, itself one */
-    char name[80];
     begin_term(w, "convolution", t->source, t->relu);
-    (void)snprintf(name, sizeof name, "%s.kernel", t->name);
-    add_plain_tensor(w, name, 5, shape,
-                     t->gain * sqrt((double)(depth * cells * cells) / t->inputs) / seen);
-    add(&w->network, ",\"column\":%d,\"kernel\":\"%s\"", t->column, name);
-    add_bias(w, t->name, t->outputs, t->relu ? 0.0 : 0.1);
-    add(&w->network, ",\"radius\":%.9g,\"window\":\"poly6\",\"mapping\":\"volume\"}",
-        r * voxel_of(a, t->level));
+    add(&w->network, ",\"column\":%d,\"outputs\":%d,\"kernel\":\"%s.kernel\"", t->column,
+        t->outputs, t->name);
+    add_bias(w, t->name);
+    add(&w->network, ",\"radius\":%.9g,\"window\":\"poly6\",\"mapping\":\"volume\"",
+        a->radius * voxel_of(a, t->level));
+    add_cells(w, a->dimension == 2 ? 8 : 4);
+    add(&w->network, "}");
 }
 
 static void add_grid_dense(writer *w, const char *name, const char *source, int32_t column,
-                           int32_t inputs, int32_t outputs)
+                           int32_t outputs)
 {
-    const size_t shape[2] = {(size_t)inputs, (size_t)outputs};
     begin_term(w, "dense", source, false);
-    add(&w->network, ",\"column\":%d,\"weight\":\"%s\"}", column, name);
-    add_plain_tensor(w, name, 2, shape, sqrt(1.0 / inputs));
+    add(&w->network, ",\"column\":%d,\"outputs\":%d,\"weight\":\"%s\"}", column, outputs, name);
 }
 
 /* Side by side: what the fluid around, the walls around and the point itself say. */
 static void grid_first_layer(writer *w)
 {
     const ascc_architecture *a = w->a;
-    const int32_t inputs = 1 + a->dimension, part = a->channels / 4;
+    const int32_t part = a->channels / 4;
     begin_layer(w, "l0", "all", a->channels);
-    add_grid_convolution(w, &(grid_term){.name = "l0.fluid",
-                                         .source = "fluid",
-                                         .inputs = inputs,
-                                         .outputs = a->channels - 2 * part,
-                                         .gain = 1.0});
+    add_grid_convolution(
+        w, &(grid_term){.name = "l0.fluid", .source = "fluid", .outputs = a->channels - 2 * part});
     add_grid_convolution(w, &(grid_term){.name = "l0.boundary",
                                          .source = "boundary",
                                          .column = a->channels - 2 * part,
-                                         .inputs = inputs,
-                                         .outputs = part,
-                                         .gain = 1.0});
-    add_grid_dense(w, "l0.fluid.dense", "fluid", a->channels - part, inputs, part);
-    add_grid_dense(w, "l0.boundary.dense", "boundary", a->channels - part, inputs, part);
+                                         .outputs = part});
+    add_grid_dense(w, "l0.fluid.dense", "fluid", a->channels - part, part);
+    add_grid_dense(w, "l0.boundary.dense", "boundary", a->channels - part, part);
 }
 
 static void grid_name(char name[32], int32_t layer, int32_t branch)
@@ -686,10 +454,7 @@ static void grid_branch(writer *w, int32_t layer, int32_t branch)
 {
     const ascc_architecture *a = w->a;
     const int32_t outputs = channels_of(a, branch);
-    int32_t sources = 0;
     char name[32], source[32], points[16], part[64];
-    for (int32_t from = 0; from <= a->levels; from++)
-        sources += branch_sees(a, layer, branch, from);
     grid_name(name, layer, branch);
     points_of(branch, "all", points);
     begin_layer(w, name, points, outputs);
@@ -701,44 +466,36 @@ static void grid_branch(writer *w, int32_t layer, int32_t branch)
         add_grid_convolution(w, &(grid_term){.name = part,
                                              .source = source,
                                              .relu = true,
-                                             .inputs = channels_of(a, from),
                                              .outputs = outputs,
-                                             .level = from > branch ? from : branch,
-                                             .gain = 1.0 / sqrt(sources)});
+                                             .level = from > branch ? from : branch});
     }
     if (!branch_exists(a, layer - 1, branch))
         return;
     grid_name(source, layer - 1, branch);
     (void)snprintf(part, sizeof part, "%s.dense", name);
-    add_dense(w, part, source, true, outputs, outputs);
+    add_dense(w, part, source, true);
     add_identity(w, source);
 }
 
 static void grid_antisymmetric_output(writer *w, const char *last)
 {
     const ascc_architecture *a = w->a;
-    const bool flat = a->dimension == 2;
-    const size_t cells = flat ? 8 : 6;
-    const size_t shape[5] = {flat ? 1 : cells, cells / 2, cells, (size_t)a->channels,
-                             (size_t)a->dimension};
     add(&w->network,
         "]}],\"output\":{\"type\":\"antisymmetric\",\"source\":\"%s\",\"relu\":true,\"scale\":%.9g,"
         "\"kernel\":\"output.kernel\",\"stored\":\"half\",\"half_axis\":\"y\",\"radius\":%.9g,"
-        "\"window\":\"peak\",\"mapping\":\"volume\",\"projection\":\"%s\"}",
+        "\"window\":\"peak\",\"mapping\":\"volume\",\"projection\":\"%s\"",
         last, SCALE * a->spacing, a->radius * a->spacing,
         ascc_architecture_projections[a->radial ? 1 : 0]);
-    add_plain_tensor(w, "output.kernel", 5, shape, 0.002);
+    add_cells(w, a->dimension == 2 ? 8 : 6);
+    add(&w->network, "}");
 }
 
 static void grid_plain_output(writer *w, const char *last)
 {
     begin_layer(w, "correction", "fluid", w->a->dimension);
-    add_grid_convolution(w, &(grid_term){.name = "correction",
-                                         .source = last,
-                                         .relu = true,
-                                         .inputs = w->a->channels,
-                                         .outputs = w->a->dimension,
-                                         .gain = 0.01});
+    add_grid_convolution(
+        w, &(grid_term){
+               .name = "correction", .source = last, .relu = true, .outputs = w->a->dimension});
     end_plain(w);
 }
 
@@ -760,7 +517,7 @@ static void grid_network(writer *w)
         grid_antisymmetric_output(w, name);
 }
 
-/* ---- The whole file ------------------------------------------------------------------------------ */
+/* ---- The whole description ------------------------------------------------------------------------------ */
 
 static void add_levels(writer *w)
 {
@@ -792,30 +549,6 @@ static void add_head(writer *w)
         a->rest_density, ascc_architecture_evaluates[a->advected ? 1 : 0]);
     if (a->levels)
         add_levels(w);
-}
-
-static unsigned char *finish(writer *w, size_t *size)
-{
-    static const char room[8] = {0};
-    bytes b = {NULL, 0, 0, false};
-    put(&b, room, sizeof room);
-    add(&b, "{\"__metadata__\":{\"format\":\"ascc.model\",\"version\":\"1\",\"network\":\"");
-    add_escaped(&b, w->network.data ? w->network.data : "");
-    add(&b, "\",\"initial_weights\":\"ascc train, seed %llu\"}", (unsigned long long)w->a->seed);
-    put(&b, w->tensors.data, w->tensors.length);
-    put(&b, "}", 1);
-    while (b.length % 8)
-        put(&b, " ", 1);
-    const uint64_t length = b.length - 8;
-    put(&b, w->data.data, w->data.length);
-    if (b.failed || w->network.failed || w->tensors.failed || w->data.failed) {
-        free(b.data);
-        return NULL;
-    }
-    for (int i = 0; i < 8; i++)
-        b.data[i] = (char)(unsigned char)(length >> 8 * i);
-    *size = b.length;
-    return (unsigned char *)b.data;
 }
 
 static const char *basis_fault(const ascc_architecture *a)
@@ -873,12 +606,10 @@ static const char *fault(const ascc_architecture *a)
     return a->kernel == ASCC_FAMILY_BASIS ? basis_fault(a) : grid_fault(a);
 }
 
-unsigned char *ascc_architecture_build(const ascc_architecture *a, size_t *size, char *error,
-                                       size_t capacity)
+char *ascc_architecture_describe(const ascc_architecture *a, char *error, size_t capacity)
 {
     writer w = {.a = a};
     const char *wrong = fault(a);
-    unsigned char *file = NULL;
     if (!wrong) {
         add_head(&w);
         if (a->kernel == ASCC_FAMILY_BASIS)
@@ -886,13 +617,11 @@ unsigned char *ascc_architecture_build(const ascc_architecture *a, size_t *size,
         else
             grid_network(&w);
         add(&w.network, "}");
-        file = finish(&w, size);
-        wrong = file ? NULL : "no memory";
+        wrong = w.network.failed ? "no memory" : NULL;
     }
-    if (wrong)
-        (void)snprintf(error, capacity, "%s", wrong);
+    if (!wrong)
+        return w.network.data;
+    (void)snprintf(error, capacity, "%s", wrong);
     free(w.network.data);
-    free(w.tensors.data);
-    free(w.data.data);
-    return file;
+    return NULL;
 }

@@ -1,4 +1,4 @@
-/* Networks to train: a model file in memory with random weights, from a few numbers.
+/* Networks to train: the description of one, from a few numbers.
  * SPDX-License-Identifier: MIT
  *
  *   family BASIS   cheap and central: layers on the fluid, scales connected by transfers,
@@ -18,8 +18,6 @@
 #include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
-
-#include <ascc/ascc.h>
 
 enum {
     ASCC_ARCHITECTURE_LEVELS = 3,
@@ -75,15 +73,14 @@ typedef struct ascc_architecture {
     bool damping;                        /* of an antisymmetric BASIS output */
     ascc_architecture_sampling sampling; /* FARTHEST: convolutions in place of transfers */
     bool advected;                       /* where the network sees particles */
-    uint64_t seed;
 } ascc_architecture;
 
 /* What stands where nothing else is said; name, spacing and time_step are 0. */
 ascc_architecture ascc_architecture_default(int32_t dimension, ascc_architecture_family kernel);
 
-/* A model file (docs/file-format.md), to be freed by free(). NULL with a line in error: a number that does
- * not fit, no memory. Same numbers, same bytes. */
-unsigned char *ascc_architecture_build(const ascc_architecture *architecture, size_t *size,
-                                       char *error, size_t capacity);
+/* The text of a description (docs/file-format.md), to be freed by free(); it tells the shapes of all tensors.
+ * NULL with a line in error: a number that does not fit, no memory. */
+char *ascc_architecture_describe(const ascc_architecture *architecture, char *error,
+                                 size_t capacity);
 
 #endif

@@ -142,6 +142,14 @@ static const char *read_word(published *p, json_t *object, const char *key, cons
 
 /* ---- The description being made ----------------------------------------------------------------- */
 
+/* cells[z, y, x] as x, y, z. */
+static void put_cells(published *p, json_t *object, const double cells[3])
+{
+    json_t *list = ascc_network_put(&p->w, object, "cells", json_array());
+    for (int axis = 2; axis >= 0; axis--)
+        (void)ascc_network_append(&p->w, list, json_integer((json_int_t)cells[axis]));
+}
+
 static void put_filter(published *p, json_t *object, double radius, const filter *f)
 {
     (void)ascc_network_put(&p->w, object, "radius", json_real(radius));
@@ -181,6 +189,9 @@ static void put_weights(published *p, json_t *term, const char *key, const char 
                           outputs);
     if (cells && memcmp(shape, p->filter.cells, sizeof p->filter.cells) != 0)
         ascc_members_fail(&p->m, "'%s' is not of the 'kernel_size' stated", name);
+    (void)ascc_network_put(&p->w, term, "outputs", json_integer(outputs));
+    if (cells)
+        put_cells(p, term, shape);
 }
 
 static void add_convolution(published *p, const char *name, const char *source, bool relu,
@@ -534,6 +545,7 @@ static void read_antisymmetric(published *p, json_t *root, int trunk_layers)
     ascc_network_put_text(&p->w, output, "kernel", "sym0.kernel_half");
     ascc_network_put_text(&p->w, output, "stored", "half");
     ascc_network_put_text(&p->w, output, "half_axis", axes[axis]);
+    put_cells(p, output, cells);
     ascc_network_put_text(&p->w, output, "projection", "none");
     put_filter(p, output, radius, &last);
 }

@@ -17,6 +17,7 @@
 #include <unistd.h>
 
 #include <ascc/train.h>
+#include <jansson.h>
 
 #include "commands.h"
 #include "console.h"
@@ -25,8 +26,8 @@
 #include "progress.h"
 #include "published.h"
 #include "sequence.h"
+#include "tensor_file.h"
 #include "train_config.h"
-#include "file/safetensors.h"
 #include "train_log.h"
 
 typedef struct training {
@@ -35,6 +36,7 @@ typedef struct training {
     bool resume;
     uint64_t end; /* iterations in all, when this run stops */
     int32_t threads;
+    ascc_train_context *context;
     ascc_trainer *trainer;
     ascc_train_log log;
     ascc_truth *truth; /* of the valid sequences */
@@ -349,35 +351,75 @@ static bool run(training *t)
 
 /* ---- From config to trainer ----------------------------------------------------------------------- */
 
+/* Where a tensor lies in the data. False: there is no such tensor, or it lies elsewhere. */
+static bool place_of(const json_t *tensor, size_t size, size_t *begin, size_t *count)
+{
+    json_int_t from, to;
+    if (json_unpack((json_t *)tensor, "{s:[I,I]}", "data_offsets", &from, &to) != 0 || from < 0 ||
+        to < from || (uint64_t)to > size)
+        return false;
+    *begin = (size_t)from;
+    *count = (size_t)(to - from);
+    return true;
+}
+
 /* Gives the tensors of one model file the numbers of another's of the same names and shapes. */
 static bool copy_weights(training *t, const unsigned char *from, size_t from_size,
                          unsigned char *to, size_t to_size)
 {
-    const ascc_allocator allocator = ascc_allocator_default();
-    ascc_safetensors source, target;
-    ascc_message why = {""};
-    if (ascc_safetensors_open(&allocator, from, from_size, &source, &why) != ASCC_OK)
-        return fail(t, t->config.model, why.text);
-    bool good = ascc_safetensors_open(&allocator, to, to_size, &target, &why) == ASCC_OK;
-    for (size_t i = 0; good && i < target.tensor_count; i++) {
-        const ascc_tensor *own = &target.tensor[i];
-        const int32_t k = ascc_safetensors_find(&source, own->name);
-        const ascc_tensor *other = k < 0 ? NULL : &source.tensor[k];
-        good = other && strcmp(other->type, own->type) == 0 && other->rank == own->rank &&
-               memcmp(other->shape, own->shape, (size_t)own->rank * sizeof *own->shape) == 0;
+    size_t from_data = 0, to_data = 0;
+    char why[256];
+    json_t *source = ascc_tensor_file_header(from, from_size, &from_data, why, sizeof why);
+    json_t *target = ascc_tensor_file_header(to, to_size, &to_data, why, sizeof why);
+    bool good = source && target;
+    const char *name;
+    json_t *own;
+    json_object_foreach(target, name, own)
+    {
+        const json_t *other = json_object_get(source, name);
+        size_t at, count, other_at, other_count;
+        if (!good || strcmp(name, "__metadata__") == 0)
+            continue;
+        good = json_equal(json_object_get(own, "shape"), json_object_get(other, "shape")) &&
+               json_equal(json_object_get(own, "dtype"), json_object_get(other, "dtype")) &&
+               place_of(own, to_size - to_data, &at, &count) &&
+               place_of(other, from_size - from_data, &other_at, &other_count) &&
+               count == other_count;
         if (good)
-            memcpy(to + (own->data - to), other->data, own->count * own->element_size);
+            memcpy(to + to_data + at, from + from_data + other_at, count);
         else
-            (void)snprintf(why.text, sizeof why.text,
+            (void)snprintf(why, sizeof why,
                            "tensor '%s' of the network is not there, or of another shape or type",
-                           own->name);
+                           name);
     }
-    if (!good)
-        (void)fail(t, t->config.model, why.text);
-    if (target.tensor)
-        ascc_safetensors_close(&target);
-    ascc_safetensors_close(&source);
-    return good;
+    json_decref(source);
+    json_decref(target);
+    return good || fail(t, t->config.model, why);
+}
+
+/* The context's last message. */
+static bool fail_made(training *t, const char *what)
+{
+    char why[256];
+    (void)ascc_train_context_message(t->context, why, sizeof why);
+    return fail(t, what, why);
+}
+
+/* A model file of the network that the config describes, from malloc; NULL after fail. */
+static unsigned char *make_model(training *t, size_t *size)
+{
+    const ascc_train_config *c = &t->config;
+    unsigned char *model = NULL;
+    if (ascc_train_initial_model(t->context, c->network, c->network_seed, NULL, 0, size) ==
+        ASCC_OK) {
+        model = malloc(*size);
+        if (model && ascc_train_initial_model(t->context, c->network, c->network_seed, model, *size,
+                                              size) == ASCC_OK)
+            return model;
+    }
+    (void)fail_made(t, "network");
+    free(model);
+    return NULL;
 }
 
 /* The bytes of a model file; a published network is converted. NULL after fail. */
@@ -398,16 +440,13 @@ static unsigned char *read_model(training *t, const char *path, size_t *size)
 static unsigned char *first_model(training *t, size_t *size)
 {
     const ascc_train_config *c = &t->config;
-    char why[256] = "";
-    size_t given_size;
+    size_t given_size = 0;
     unsigned char *given = c->model[0] ? read_model(t, c->model, &given_size) : NULL;
-    if (c->model[0] && (!given || !c->described)) {
+    if (c->model[0] && (!given || !c->network)) {
         *size = given_size;
         return given;
     }
-    unsigned char *made = ascc_architecture_build(&c->architecture, size, why, sizeof why);
-    if (!made)
-        (void)fail(t, "network", why);
+    unsigned char *made = make_model(t, size);
     if (made && given && !copy_weights(t, given, given_size, made, *size)) {
         free(made);
         made = NULL;
@@ -418,20 +457,18 @@ static unsigned char *first_model(training *t, size_t *size)
 
 static bool create_trainer(training *t)
 {
-    ascc_train_config *c = &t->config;
-    char why[256] = "";
+    const ascc_train_config *c = &t->config;
+    const ascc_context_options options = {.size = sizeof options, .thread_count = t->threads};
     size_t size;
+    ascc_status status = ascc_train_context_create(&options, &t->context);
+    if (status != ASCC_OK)
+        return fail(t, "threads", ascc_status_text(status));
     unsigned char *bytes = first_model(t, &size);
     if (!bytes)
         return false;
-    c->options.thread_count = t->threads;
-    c->options.message = why;
-    c->options.message_size = sizeof why;
-    const ascc_status status = ascc_trainer_create(&c->options, bytes, size, &t->trainer);
+    status = ascc_trainer_create(t->context, &c->options, bytes, size, &t->trainer);
     free(bytes);
-    if (status != ASCC_OK)
-        return fail(t, c->model[0] ? c->model : "network", why[0] ? why : ascc_status_text(status));
-    return true;
+    return status == ASCC_OK || fail_made(t, c->model[0] ? c->model : "network");
 }
 
 static bool load_checkpoint(training *t)
@@ -491,6 +528,7 @@ static void close_all(training *t)
     free(t->truth);
     ascc_train_log_close(&t->log);
     ascc_trainer_destroy(&t->trainer);
+    ascc_train_context_destroy(&t->context);
     ascc_train_config_free(&t->config);
 }
 

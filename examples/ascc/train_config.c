@@ -7,54 +7,65 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "file/json_reader.h"
+#include "architecture.h"
+#include "members.h"
+#include "network_writer.h"
 
 static const char SUFFIX[] = ".safetensors";
 static const double MANY = 1e9;
 
 typedef struct reading {
-    ascc_reader r;
+    ascc_members r;
     char folder[ASCC_TRAIN_PATH]; /* ends in a slash, or is empty */
 } reading;
 
 /* ---- Members that may be missing ------------------------------------------------------------------ */
 
-static double number_or(ascc_reader *r, uint32_t object, const char *key, double low, double high,
+static bool has(const ascc_members *r, const json_t *object, const char *key)
+{
+    return ascc_members_good(r) && json_object_get(object, key);
+}
+
+static double number_or(ascc_members *r, json_t *object, const char *key, double low, double high,
                         double otherwise)
 {
-    return ascc_reader_has(r, object, key) ? ascc_reader_number(r, object, key, low, high)
-                                           : otherwise;
+    return has(r, object, key) ? ascc_members_number(r, object, key, low, high) : otherwise;
 }
 
-static int32_t integer_or(ascc_reader *r, uint32_t object, const char *key, int32_t low,
+static int32_t integer_or(ascc_members *r, json_t *object, const char *key, int32_t low,
                           int32_t high, int32_t otherwise)
 {
-    return ascc_reader_has(r, object, key) ? ascc_reader_integer(r, object, key, low, high)
-                                           : otherwise;
+    return has(r, object, key) ? ascc_members_integer(r, object, key, low, high) : otherwise;
 }
 
-static bool flag_or(ascc_reader *r, uint32_t object, const char *key, bool otherwise)
+static bool flag_or(ascc_members *r, json_t *object, const char *key, bool otherwise)
 {
-    return ascc_reader_has(r, object, key) ? ascc_reader_flag(r, object, key) : otherwise;
+    return has(r, object, key) ? ascc_members_flag(r, object, key) : otherwise;
 }
 
-static int32_t choice_or(ascc_reader *r, uint32_t object, const char *key,
+static int32_t choice_or(ascc_members *r, json_t *object, const char *key,
                          const char *const *choices, int32_t count, int32_t otherwise)
 {
-    return ascc_reader_has(r, object, key) ? ascc_reader_choice(r, object, key, choices, count)
-                                           : otherwise;
+    if (!has(r, object, key))
+        return otherwise;
+    const char *text = ascc_members_text(r, object, key);
+    for (int32_t i = 0; i < count; i++)
+        if (strcmp(text, choices[i]) == 0)
+            return i;
+    ascc_members_fail(r, "'%s' does not understand '%.60s'", key, text);
+    return otherwise;
 }
 
-static void text_of(ascc_reader *r, uint32_t object, const char *key, char *into, size_t capacity)
+/* ---- Texts and paths ------------------------------------------------------------------------------ */
+
+static void text_of(ascc_members *r, json_t *object, const char *key, char *into, size_t capacity)
 {
-    const char *text = ascc_reader_text(r, object, key);
+    const char *text = ascc_members_text(r, object, key);
     if (strlen(text) >= capacity)
-        ascc_reader_fail(r, "'%s' is longer than %zu bytes", key, capacity - 1);
+        ascc_members_fail(r, "'%s' is longer than %zu bytes", key, capacity - 1);
     else
         (void)snprintf(into, capacity, "%s", text);
 }
-
-/* ---- Paths ---------------------------------------------------------------------------------------- */
 
 static bool has_controls(const char *path)
 {
@@ -68,20 +79,20 @@ static void join(reading *g, const char *path, char into[ASCC_TRAIN_PATH])
 {
     const char *folder = path[0] == '/' ? "" : g->folder;
     if (!path[0])
-        ascc_reader_fail(&g->r, "a path is empty");
+        ascc_members_fail(&g->r, "a path is empty");
     else if (has_controls(
                  path)) /* a program that is told of the file would read on in a new line */
-        ascc_reader_fail(&g->r, "a path holds a control character");
+        ascc_members_fail(&g->r, "a path holds a control character");
     else if (strlen(folder) + strlen(path) + 32 > ASCC_TRAIN_PATH)
-        ascc_reader_fail(&g->r, "a path is too long");
+        ascc_members_fail(&g->r, "a path is too long");
     else
         (void)snprintf(into, ASCC_TRAIN_PATH, "%.2000s%.2000s", folder, path);
 }
 
-static void path_of(reading *g, uint32_t object, const char *key, char into[ASCC_TRAIN_PATH])
+static void path_of(reading *g, json_t *object, const char *key, char into[ASCC_TRAIN_PATH])
 {
-    const char *path = ascc_reader_text(&g->r, object, key);
-    if (g->r.status == ASCC_OK)
+    const char *path = ascc_members_text(&g->r, object, key);
+    if (ascc_members_good(&g->r))
         join(g, path, into);
 }
 
@@ -106,7 +117,7 @@ static void add_source(reading *g, ascc_train_sources *list, const char *path, d
         list->source = grown;
     if (!grown || !copy || list->count == ASCC_TRAIN_SOURCES) {
         free(copy);
-        ascc_reader_fail(&g->r, "no memory, or more than %d sequences", ASCC_TRAIN_SOURCES);
+        ascc_members_fail(&g->r, "no memory, or more than %d sequences", ASCC_TRAIN_SOURCES);
         return;
     }
     (void)strcpy(copy, path);
@@ -131,88 +142,104 @@ static void add_matches(reading *g, ascc_train_sources *list, const char *path, 
 {
     char pattern[2 * ASCC_TRAIN_PATH];
     glob_t found = {0};
-    if (g->r.status != ASCC_OK)
+    if (!ascc_members_good(&g->r))
         return;
     if (!path[0] || !write_pattern(g, path, pattern, sizeof pattern) ||
         glob(pattern, 0, NULL, &found) != 0 || found.gl_pathc == 0)
-        ascc_reader_fail(&g->r, "%.150s: there is no such file", path);
+        ascc_members_fail(&g->r, "%.150s: there is no such file", path);
     for (size_t i = 0; i < found.gl_pathc; i++)
         add_source(g, list, found.gl_pathv[i], share, every);
     globfree(&found);
 }
 
-static void read_sources(reading *g, uint32_t data, const char *key, ascc_train_sources *list)
+static void read_sources(reading *g, json_t *data, const char *key, ascc_train_sources *list)
 {
-    ascc_reader *r = &g->r;
-    const uint32_t array = ascc_reader_array(r, data, key);
-    if (r->status != ASCC_OK)
-        return;
-    if (r->json->value[array].count == 0)
-        ascc_reader_fail(r, "'%s' is empty", key);
-    for (uint32_t i = ascc_json_first(r->json, array); i && r->status == ASCC_OK;
-         i = r->json->value[i].next) {
-        const ascc_json_value *value = &r->json->value[i];
-        ascc_reader_where(r, "data: %s", key);
-        if (value->kind == ASCC_JSON_STRING) {
-            add_matches(g, list, value->text, 1.0, 1);
-        } else if (value->kind == ASCC_JSON_OBJECT) {
-            const char *path = ascc_reader_text(r, i, "path");
-            const double share = number_or(r, i, "share", 1e-6, 1e6, 1.0);
-            const int32_t every = integer_or(r, i, "every", 1, 1000, 1);
-            ascc_reader_end(r, i);
+    ascc_members *r = &g->r;
+    const json_t *array = ascc_members_array(r, data, key);
+    size_t i;
+    json_t *value;
+    if (array && json_array_size(array) == 0)
+        ascc_members_fail(r, "'%s' is empty", key);
+    json_array_foreach(array, i, value)
+    {
+        ascc_members_where(r, "data: %s", key);
+        if (json_is_string(value)) {
+            add_matches(g, list, json_string_value(value), 1.0, 1);
+        } else if (json_is_object(value)) {
+            const char *path = ascc_members_text(r, value, "path");
+            const double share = number_or(r, value, "share", 1e-6, 1e6, 1.0);
+            const int32_t every = integer_or(r, value, "every", 1, 1000, 1);
+            ascc_members_end(r, value);
             add_matches(g, list, path, share, every);
         } else {
-            ascc_reader_fail(r, "a path or an object with a path is wanted");
+            ascc_members_fail(r, "a path or an object with a path is wanted");
         }
     }
 }
 
-static void read_data(reading *g, uint32_t root, ascc_train_config *c)
+static void read_data(reading *g, json_t *root, ascc_train_config *c)
 {
-    ascc_reader_where(&g->r, "config");
-    const uint32_t data = ascc_reader_object(&g->r, root, "data");
-    ascc_reader_where(&g->r, "data");
-    const bool valid = ascc_reader_has(&g->r, data, "valid");
+    ascc_members_where(&g->r, "config");
+    json_t *data = ascc_members_object(&g->r, root, "data");
+    ascc_members_where(&g->r, "data");
+    const bool valid = has(&g->r, data, "valid");
     read_sources(g, data, "train", &c->train);
     if (valid)
         read_sources(g, data, "valid", &c->valid);
-    ascc_reader_where(&g->r, "data");
-    ascc_reader_end(&g->r, data);
+    ascc_members_where(&g->r, "data");
+    ascc_members_end(&g->r, data);
+}
+
+/* A whole file, and a zero after it; NULL with an error. */
+static char *read_text(const char *path, size_t *size, char *error, size_t capacity)
+{
+    enum { MOST = 1 << 20 };
+    FILE *file = fopen(path, "rb");
+    char *text = file ? malloc(MOST) : NULL;
+    *size = text ? fread(text, 1, MOST - 1, file) : 0;
+    const bool good = text && !ferror(file) && *size < MOST - 1;
+    if (!good) {
+        (void)snprintf(error, capacity, "%.300s: %s", path,
+                       file && text && !ferror(file) ? "too long" : strerror(errno));
+        free(text);
+    }
+    if (file)
+        (void)fclose(file);
+    if (good)
+        text[*size] = '\0';
+    return good ? text : NULL;
 }
 
 /* ---- The network ---------------------------------------------------------------------------------- */
 
-static void read_coarse(ascc_reader *r, uint32_t o, ascc_architecture *a)
+static void read_coarse(ascc_members *r, json_t *o, ascc_architecture *a)
 {
     double channels[ASCC_ARCHITECTURE_LEVELS] = {0.0};
     a->levels = integer_or(r, o, "levels", 0, ASCC_ARCHITECTURE_LEVELS, 0);
     a->coarse_layers = integer_or(r, o, "coarse_layers", 1, 16, a->coarse_layers);
-    if (a->levels || ascc_reader_has(r, o, "coarse_channels"))
-        ascc_reader_numbers(r, o, "coarse_channels", a->levels, 1.0, ASCC_ARCHITECTURE_CHANNELS,
-                            channels);
+    if (a->levels || has(r, o, "coarse_channels"))
+        ascc_members_numbers(r, o, "coarse_channels", (size_t)a->levels, 1.0,
+                             ASCC_ARCHITECTURE_CHANNELS, channels);
     for (int32_t i = 0; i < a->levels; i++)
         a->coarse_channels[i] = (int32_t)channels[i];
 }
 
-static void read_scene(ascc_reader *r, uint32_t o, ascc_architecture *a)
+static void read_scene(ascc_members *r, json_t *o, ascc_architecture *a)
 {
-    a->spacing = ascc_reader_number(r, o, "spacing", 1e-6, 1e6);
-    a->time_step = ascc_reader_number(r, o, "time_step", 1e-9, 1e6);
+    a->spacing = ascc_members_number(r, o, "spacing", 1e-6, 1e6);
+    a->time_step = ascc_members_number(r, o, "time_step", 1e-9, 1e6);
     a->rest_density = number_or(r, o, "rest_density", 1e-6, 1e9, a->rest_density);
-    if (ascc_reader_has(r, o, "gravity"))
-        ascc_reader_numbers(r, o, "gravity", a->dimension, -1e6, 1e6, a->gravity);
+    if (has(r, o, "gravity"))
+        ascc_members_numbers(r, o, "gravity", (size_t)a->dimension, -1e6, 1e6, a->gravity);
 }
 
-static void read_network(reading *g, uint32_t root, int32_t seed, ascc_architecture *a)
+static void read_architecture(ascc_members *r, json_t *o, ascc_architecture *a)
 {
-    ascc_reader *r = &g->r;
-    const uint32_t o = ascc_reader_object(r, root, "network");
-    ascc_reader_where(r, "network");
-    const int32_t dimension = ascc_reader_integer(r, o, "dimension", 2, 3);
+    const int32_t dimension = ascc_members_integer(r, o, "dimension", 2, 3);
     const int32_t kernel = choice_or(r, o, "kernel", ascc_architecture_kernels, 2, 0);
     *a = ascc_architecture_default(dimension, (ascc_architecture_family)kernel);
     text_of(r, o, "name", a->name, sizeof a->name);
-    if (ascc_reader_has(r, o, "description"))
+    if (has(r, o, "description"))
         text_of(r, o, "description", a->description, sizeof a->description);
     read_scene(r, o, a);
     a->channels = integer_or(r, o, "channels", 1, ASCC_ARCHITECTURE_CHANNELS, a->channels);
@@ -239,45 +266,86 @@ static void read_network(reading *g, uint32_t root, int32_t seed, ascc_architect
     a->sampling = (ascc_architecture_sampling)choice_or(
         r, o, "sampling", ascc_architecture_samplings, 3, (int32_t)a->sampling);
     a->advected = choice_or(r, o, "evaluate", ascc_architecture_evaluates, 2, a->advected) == 1;
-    a->seed = (uint64_t)integer_or(r, o, "seed", 0, INT32_MAX, seed);
-    ascc_reader_end(r, o);
+}
+
+/* The text of the description that the architecture's numbers make. */
+static void read_network(reading *g, json_t *root, ascc_train_config *c)
+{
+    ascc_members *r = &g->r;
+    char why[256];
+    ascc_architecture a;
+    json_t *o = ascc_members_object(r, root, "network");
+    ascc_members_where(r, "network");
+    read_architecture(r, o, &a);
+    c->network_seed = (uint64_t)integer_or(r, o, "seed", 0, INT32_MAX, (int32_t)c->options.seed);
+    ascc_members_end(r, o);
+    if (!ascc_members_good(r))
+        return;
+    c->network = ascc_architecture_describe(&a, why, sizeof why);
+    if (!c->network)
+        ascc_members_fail(r, "%s", why);
+}
+
+/* The description itself, or the path of a file of it. */
+static void read_description(reading *g, json_t *root, ascc_train_config *c)
+{
+    ascc_members *r = &g->r;
+    char path[ASCC_TRAIN_PATH] = "", why[ASCC_TRAIN_PATH + 64];
+    size_t size;
+    c->network_seed = c->options.seed;
+    if (json_is_object(json_object_get(root, "description"))) {
+        json_t *value = ascc_members_object(r, root, "description");
+        c->network = ascc_network_text(&(ascc_network_writer){.network = value});
+        if (!c->network)
+            ascc_members_fail(r, "no memory");
+        return;
+    }
+    path_of(g, root, "description", path);
+    if (!ascc_members_good(r))
+        return;
+    c->network = read_text(path, &size, why, sizeof why);
+    if (!c->network)
+        ascc_members_fail(r, "%s", why);
 }
 
 /* ---- Schedule and options ------------------------------------------------------------------------- */
 
-static void read_stages(reading *g, uint32_t root, ascc_train_config *c)
+static void read_stages(reading *g, json_t *root, ascc_train_config *c)
 {
-    ascc_reader *r = &g->r;
+    ascc_members *r = &g->r;
     uint64_t end = 0;
     int32_t count = 0;
-    ascc_reader_where(r, "config");
-    const uint32_t array = ascc_reader_array(r, root, "stages");
-    for (uint32_t i = array ? ascc_json_first(r->json, array) : 0; i && r->status == ASCC_OK;
-         i = r->json->value[i].next) {
-        ascc_reader_where(r, "stage %d", count + 1);
-        if (count == ASCC_TRAIN_STAGES || r->json->value[i].kind != ASCC_JSON_OBJECT) {
-            ascc_reader_fail(r, "stages are objects, at most %d", ASCC_TRAIN_STAGES);
+    ascc_members_where(r, "config");
+    const json_t *array = ascc_members_array(r, root, "stages");
+    size_t i;
+    json_t *stage;
+    json_array_foreach(array, i, stage)
+    {
+        ascc_members_where(r, "stage %d", count + 1);
+        if (count == ASCC_TRAIN_STAGES || !json_is_object(stage)) {
+            ascc_members_fail(r, "stages are objects, at most %d", ASCC_TRAIN_STAGES);
             break;
         }
         ascc_training_stage *s = &c->stage[count++];
-        end += (uint64_t)ascc_reader_integer(r, i, "iterations", 1, 1000000000);
+        end += (uint64_t)ascc_members_integer(r, stage, "iterations", 1, 1000000000);
         s->end = end;
-        s->horizon = ascc_reader_integer(r, i, "horizon", 1, 10000);
-        s->presteps = integer_or(r, i, "presteps", 0, 10000, 0);
-        s->learning_rate = ascc_reader_number(r, i, "learning_rate", 0.0, 1.0);
-        s->learning_rate_end = number_or(r, i, "learning_rate_end", 1e-30, 1.0, 0.0);
-        ascc_reader_end(r, i);
+        s->horizon = ascc_members_integer(r, stage, "horizon", 1, 10000);
+        s->presteps = integer_or(r, stage, "presteps", 0, 10000, 0);
+        s->learning_rate = ascc_members_number(r, stage, "learning_rate", 0.0, 1.0);
+        s->learning_rate_end = number_or(r, stage, "learning_rate_end", 1e-30, 1.0, 0.0);
+        ascc_members_end(r, stage);
     }
-    ascc_reader_where(r, "config");
+    ascc_members_where(r, "config");
     if (count == 0)
-        ascc_reader_fail(r, "'stages' is empty");
+        ascc_members_fail(r, "'stages' is empty");
     c->options.stage = c->stage;
+    c->options.stage_size = sizeof *c->stage;
     c->options.stage_count = count;
 }
 
-static void read_options(reading *g, uint32_t root, ascc_trainer_options *o)
+static void read_options(reading *g, json_t *root, ascc_trainer_options *o)
 {
-    ascc_reader *r = &g->r;
+    ascc_members *r = &g->r;
     o->size = sizeof *o;
     o->seed = (uint64_t)integer_or(r, root, "seed", 0, INT32_MAX, 1);
     o->batch = integer_or(r, root, "batch", 1, 4096, 8);
@@ -296,114 +364,103 @@ static void read_options(reading *g, uint32_t root, ascc_trainer_options *o)
     o->memory_limit = (size_t)(gib * 1024.0 * 1024.0 * 1024.0);
 }
 
-static void read_outputs(reading *g, uint32_t root, ascc_train_config *c)
+static void read_outputs(reading *g, json_t *root, ascc_train_config *c)
 {
-    ascc_reader *r = &g->r;
-    ascc_reader_where(r, "config");
+    ascc_members *r = &g->r;
+    ascc_members_where(r, "config");
     path_of(g, root, "output", c->output);
     derive(c->output, SUFFIX, c->valid.count ? "-latest.safetensors" : SUFFIX, c->latest);
     derive(c->output, SUFFIX, ".csv", c->log);
     derive(c->output, SUFFIX, ".checkpoint", c->checkpoint);
-    if (ascc_reader_has(r, root, "log"))
+    if (has(r, root, "log"))
         path_of(g, root, "log", c->log);
     derive(c->log, ".csv", ".svg", c->chart);
     c->checkpoint_seconds = 600.0;
-    if (ascc_reader_has(r, root, "checkpoint")) {
-        const uint32_t o = ascc_reader_object(r, root, "checkpoint");
-        ascc_reader_where(r, "checkpoint");
-        if (ascc_reader_has(r, o, "path"))
+    if (has(r, root, "checkpoint")) {
+        json_t *o = ascc_members_object(r, root, "checkpoint");
+        ascc_members_where(r, "checkpoint");
+        if (has(r, o, "path"))
             path_of(g, o, "path", c->checkpoint);
         c->checkpoint_seconds = number_or(r, o, "every_seconds", 0.0, MANY, 600.0);
-        ascc_reader_end(r, o);
-        ascc_reader_where(r, "config");
+        ascc_members_end(r, o);
+        ascc_members_where(r, "config");
     }
 }
 
-static void read_validation(reading *g, uint32_t root, ascc_train_config *c)
+static void read_validation(reading *g, json_t *root, ascc_train_config *c)
 {
-    ascc_reader *r = &g->r;
+    ascc_members *r = &g->r;
     c->validate_every = 500;
     c->validate_frames = 20;
     c->validate_starts = 10;
     c->validate_rollouts = 1;
-    if (!ascc_reader_has(r, root, "validate"))
+    if (!has(r, root, "validate"))
         return;
-    const uint32_t o = ascc_reader_object(r, root, "validate");
-    ascc_reader_where(r, "validate");
+    json_t *o = ascc_members_object(r, root, "validate");
+    ascc_members_where(r, "validate");
     if (!c->valid.count)
-        ascc_reader_fail(r, "there is no 'valid' in 'data'");
+        ascc_members_fail(r, "there is no 'valid' in 'data'");
     c->validate_every = (uint64_t)integer_or(r, o, "every_iterations", 1, 1000000000, 500);
     c->validate_frames = integer_or(r, o, "frames", 0, 1000000, 20);
     c->validate_starts = integer_or(r, o, "starts", 1, 1000000, 10);
     c->validate_rollouts = integer_or(r, o, "rollouts", 0, 1000000, 1);
-    ascc_reader_end(r, o);
-    ascc_reader_where(r, "config");
+    ascc_members_end(r, o);
+    ascc_members_where(r, "config");
 }
 
-static void read_all(reading *g, ascc_train_config *c)
+static void read_all(reading *g, json_t *root, ascc_train_config *c)
 {
-    ascc_reader *r = &g->r;
-    ascc_reader_where(r, "config");
-    if (r->json->value[0].kind != ASCC_JSON_OBJECT)
-        ascc_reader_fail(r, "not an object");
-    read_options(g, 0, &c->options);
-    c->described = ascc_reader_has(r, 0, "network");
-    if (ascc_reader_has(r, 0, "model"))
-        path_of(g, 0, "model", c->model);
-    else if (!c->described)
-        ascc_reader_fail(r, "'network' or 'model' is wanted");
-    if (c->described)
-        read_network(g, 0, (int32_t)c->options.seed, &c->architecture);
-    read_data(g, 0, c);
-    read_stages(g, 0, c);
-    read_outputs(g, 0, c);
-    read_validation(g, 0, c);
-    ascc_reader_end(r, 0);
+    ascc_members *r = &g->r;
+    ascc_members_where(r, "config");
+    read_options(g, root, &c->options);
+    const bool described = has(r, root, "description");
+    const bool built = has(r, root, "network");
+    if (has(r, root, "model"))
+        path_of(g, root, "model", c->model);
+    else if (!built && !described)
+        ascc_members_fail(r, "'network', 'description' or 'model' is wanted");
+    if (built && described)
+        ascc_members_fail(r, "'network' and 'description' exclude each other");
+    if (built)
+        read_network(g, root, c);
+    if (described)
+        read_description(g, root, c);
+    read_data(g, root, c);
+    read_stages(g, root, c);
+    read_outputs(g, root, c);
+    read_validation(g, root, c);
+    ascc_members_end(r, root);
 }
 
 /* ---- The file ------------------------------------------------------------------------------------- */
 
-static char *read_text(const char *path, size_t *size, char *error, size_t capacity)
-{
-    enum { MOST = 1 << 20 };
-    FILE *file = fopen(path, "rb");
-    char *text = file ? malloc(MOST) : NULL;
-    *size = text ? fread(text, 1, MOST, file) : 0;
-    const bool good = text && !ferror(file) && *size < MOST;
-    if (!good) {
-        (void)snprintf(error, capacity, "%.300s: %s", path,
-                       file && text && !ferror(file) ? "too long" : strerror(errno));
-        free(text);
-    }
-    if (file)
-        (void)fclose(file);
-    return good ? text : NULL;
-}
-
 bool ascc_train_config_read(const char *path, ascc_train_config *c, char *error, size_t capacity)
 {
-    const ascc_allocator allocator = ascc_allocator_default();
-    ascc_message message = {""};
-    ascc_json json;
     size_t size;
     memset(c, 0, sizeof *c);
     char *text = read_text(path, &size, error, capacity);
     if (!text)
         return false;
-    ascc_status status = ascc_json_open(&allocator, text, size, &json, &message);
-    if (status == ASCC_OK) {
-        reading g = {.r = {.json = &json, .message = &message}};
-        const char *slash = strrchr(path, '/');
-        if (slash)
-            (void)snprintf(g.folder, sizeof g.folder, "%.*s", (int)(slash - path + 1), path);
-        read_all(&g, c);
-        status = g.r.status;
-        ascc_json_close(&json);
-    }
+    json_error_t why;
+    json_t *root = json_loadb(text, size, JSON_REJECT_DUPLICATES, &why);
+    reading g = {.r = {.taken = json_array()}};
+    const char *slash = strrchr(path, '/');
+    if (slash)
+        (void)snprintf(g.folder, sizeof g.folder, "%.*s", (int)(slash - path + 1), path);
+    ascc_members_where(&g.r, "config");
+    if (!root)
+        ascc_members_fail(&g.r, "line %d: %s", why.line, why.text);
+    else if (!json_is_object(root))
+        ascc_members_fail(&g.r, "not an object");
+    else
+        read_all(&g, root, c);
+    const bool good = ascc_members_good(&g.r);
+    if (!good)
+        (void)snprintf(error, capacity, "%.300s: %s", path, g.r.error);
+    json_decref(root);
+    json_decref(g.r.taken);
     free(text);
-    if (status != ASCC_OK)
-        (void)snprintf(error, capacity, "%.300s: %s", path, message.text);
-    return status == ASCC_OK;
+    return good;
 }
 
 static void free_sources(ascc_train_sources *list)
@@ -417,4 +474,6 @@ void ascc_train_config_free(ascc_train_config *c)
 {
     free_sources(&c->train);
     free_sources(&c->valid);
+    free(c->network);
+    c->network = NULL;
 }

@@ -3,8 +3,7 @@
 #define ASCC_TRAIN_CONFIG_H
 
 #include <ascc/train.h>
-
-#include "architecture.h"
+#include <stdbool.h>
 
 enum { ASCC_TRAIN_PATH = 4096, ASCC_TRAIN_STAGES = 64, ASCC_TRAIN_SOURCES = 4096 };
 
@@ -21,8 +20,8 @@ typedef struct ascc_train_sources {
 } ascc_train_sources;
 
 typedef struct ascc_train_config {
-    bool described; /* the architecture is given */
-    ascc_architecture architecture;
+    char *network; /* its description, to begin with random weights; NULL = none */
+    uint64_t network_seed;
     char model[ASCC_TRAIN_PATH]; /* a file in place of it, or with it for the weights; or "" */
     ascc_train_sources train, valid;
     ascc_training_stage stage[ASCC_TRAIN_STAGES];

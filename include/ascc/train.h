@@ -2,12 +2,13 @@
  * libascc-train: trains networks for libascc over rollouts, with the run-time's own forward pass.
  * SPDX-License-Identifier: MIT
  *
- * A program makes a trainer from a model file in memory (initial weights and all), adds sequences, and
- * iterates: each iteration draws `batch` stretches of the sequences, rolls the present network out over
- * each, and moves the weights once. `ascc train` is such a program.
+ * A program makes a context, a model file with initial weights from the description of a network, a trainer
+ * from that file, adds sequences, and iterates: each iteration draws `batch` stretches of the sequences, rolls
+ * the present network out over each, and moves the weights once. examples/learn.c does all of it; `ascc train`
+ * is such a program.
  *
  * libascc-train brings its own copy of the run-time: it shares no handle with libascc, only bytes of
- * model files. What ascc.h says of structs, destroy, units and printing holds here, too.
+ * model files. What ascc.h says of results, structs, destroy, errors, units and printing holds here, too.
  */
 #ifndef ASCC_TRAIN_H
 #define ASCC_TRAIN_H
@@ -17,6 +18,42 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
+
+/* ---- Context: memory, log, workers ------------------------------------------------------------ */
+
+typedef struct ascc_train_context ascc_train_context;
+
+/**
+ * Makes a context, with the options of libascc's: thread_count is the number of rollouts that are computed at
+ * once (it has no influence on results). Rollouts allocate: with more than one thread, or a job system, the
+ * memory callbacks are called on several threads at once. errors: ARGUMENT, MEMORY, told to the log.
+ */
+ASCC_API ascc_status ascc_train_context_create(const ascc_context_options *options,
+                                               ascc_train_context **context);
+ASCC_API void ascc_train_context_destroy(ascc_train_context **context);
+
+/** Copies the message of the last failed ascc_train_initial_model or ascc_trainer_create of this context, or
+ * "", into text[capacity], always terminated. Returns its whole length. Any thread. */
+ASCC_API size_t ascc_train_context_message(const ascc_train_context *context, char *text,
+                                           size_t capacity);
+
+/* ---- Initial weights -------------------------------------------------------------------------- */
+
+/**
+ * Makes a model file with every tensor that a network's description names, filled with random values to begin
+ * training with: weights sized by how many numbers and neighbours they sum over, biases 0 or small, damping not
+ * negative. Same description and seed, same bytes, on any machine.
+ *
+ * description   the text of `network` in docs/file-format.md, with the keys `cells` and `outputs` where the
+ *               shapes of tensors follow from nothing else
+ * model         receives the file, at most capacity bytes; NULL to learn its size alone
+ * errors        ARGUMENT (capacity too small), MEMORY, FORMAT; the context's message names the key
+ */
+ASCC_API ascc_status ascc_train_initial_model(ascc_train_context *context, const char *description,
+                                              uint64_t seed, void *model, size_t capacity,
+                                              size_t *size);
+
+/* ---- Trainer ---------------------------------------------------------------------------------- */
 
 typedef struct ascc_trainer ascc_trainer;
 
@@ -44,30 +81,29 @@ typedef struct ascc_training_stage {
 
 /** Options of ascc_trainer_create. Zero means the default that is stated. */
 typedef struct ascc_trainer_options {
-    size_t size;          /* sizeof(ascc_trainer_options) */
-    uint64_t seed;        /* same seed and options, same weights to the bit */
-    int32_t thread_count; /* rollouts computed at once; no influence on results; 0 = 1 */
-    int32_t batch;        /* rollouts an iteration; 0 = 8 */
+    size_t size;                      /* sizeof(ascc_trainer_options) */
+    uint64_t seed;                    /* same seed and options, same weights to the bit */
     const ascc_training_stage *stage; /* at least one, `end` ascending */
+    size_t stage_size;                /* sizeof(ascc_training_stage) */
     int32_t stage_count;
-    int32_t position_gradients;   /* 1: also through the places of particles; 0: as constants */
+    int32_t batch;                /* rollouts an iteration; 0 = 8 */
     double beta1, beta2, epsilon; /* Adam: 0.9, 0.999, 1e-8 */
     double clip;                  /* largest norm of a gradient; 0 = 1 */
-    double average; /* each iteration's share that the averaged weights keep, such as 0.999;
+    double average;     /* each iteration's share that the averaged weights keep, such as 0.999;
                                    0 = not averaged */
-    double jitter;  /* noise on first positions and velocities, particle spacings (a step) */
-    int32_t rotate; /* 1: turn rollouts about gravity (without gravity: about any axis) */
-    int32_t mirror; /* 1: mirror every second rollout in a plane along gravity */
-    double
-        neighbor_weight; /* of exp(-w c / c_avg) in Eq. 3; 0 = 1; negative = all particles alike */
-    double density_weight; /* of the penalty on compression, see docs/training.md; 0 = none */
-    double wall_weight;    /* of the penalty on particles in walls; 0 = none */
-    size_t memory_limit;   /* bytes of kept steps in all rollouts at once; what does not fit is
-                                   computed a second time; 0 = 4 GiB */
-    char *message;         /* where creation says what is wrong; may be NULL */
-    size_t message_size;
+    double jitter;      /* noise on first positions and velocities, particle spacings (a step) */
     double truth_share; /* of rollouts begun at true states, without steps before them, [0, 1];
                                    the others draw 0 to W */
+    double
+        neighbor_weight; /* of exp(-w c / c_avg) in Eq. 3; 0 = 1; negative = all particles alike */
+    double density_weight;      /* of the penalty on compression, see docs/training.md; 0 = none */
+    double wall_weight;         /* of the penalty on particles in walls; 0 = none */
+    size_t memory_limit;        /* bytes of kept steps in all rollouts at once; what does not fit is
+                                   computed a second time; 0 = 4 GiB */
+    int32_t position_gradients; /* 1: also through the places of particles; 0: as constants */
+    int32_t rotate;   /* 1: turn rollouts about gravity (without gravity: about any axis) */
+    int32_t mirror;   /* 1: mirror every second rollout in a plane along gravity */
+    int32_t reserved; /* 0 */
 } ascc_trainer_options;
 
 /** What an iteration did. */
@@ -86,9 +122,13 @@ typedef struct ascc_training_report {
 
 /**
  * Makes a trainer for a model file in memory (all tensors F32), which is copied.
- * threads: one trainer is used by one thread at a time. errors: ARGUMENT, MEMORY, FORMAT.
+ *
+ * context   may be destroyed before the trainer; several trainers may share it.
+ * threads   one trainer is used by one thread at a time.
+ * errors    ARGUMENT, MEMORY, FORMAT; the context's message says what is wrong.
  */
-ASCC_API ascc_status ascc_trainer_create(const ascc_trainer_options *options, const void *model,
+ASCC_API ascc_status ascc_trainer_create(ascc_train_context *context,
+                                         const ascc_trainer_options *options, const void *model,
                                          size_t model_size, ascc_trainer **trainer);
 ASCC_API void ascc_trainer_destroy(ascc_trainer **trainer);
 
@@ -135,10 +175,10 @@ ASCC_API uint64_t ascc_trainer_iteration(const ascc_trainer *trainer);
  * iteration beyond 2^53 are FORMAT, and the message names the tensor.
  * errors: FILE, FORMAT, MISMATCH (of another network), MEMORY; after a failed load the trainer is as it was.
  */
-ASCC_API ascc_status ascc_trainer_save(const ascc_trainer *trainer, const char *path);
+ASCC_API ascc_status ascc_trainer_save(ascc_trainer *trainer, const char *path);
 ASCC_API ascc_status ascc_trainer_load(ascc_trainer *trainer, const char *path);
 
-/** One line about the last call that failed. */
+/** One line about the last call with this trainer that failed, valid until the next; the log gets it, too. */
 ASCC_API const char *ascc_trainer_message(const ascc_trainer *trainer);
 
 #ifdef __cplusplus

@@ -5,8 +5,10 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "base/float_env.h"
 #include "model/description.h"
 #include "model/initial.h"
+#include "train_context.h"
 
 static const double SMALL = 0.01; /* of the layer that is the correction itself */
 
@@ -213,4 +215,41 @@ ascc_status ascc_initial_model_make(const ascc_allocator *allocator, const char 
     }
     ascc_plan_close(&builder);
     return status;
+}
+
+/* ---- The call ---- */
+
+static ascc_status copy_model(const ascc_model_file *file, void *model, size_t capacity,
+                              size_t *size, ascc_message *message)
+{
+    if (model && capacity < file->size)
+        return ascc_fail(message, ASCC_ERROR_ARGUMENT,
+                         "initial model: it has %zu bytes, more than the %zu given", file->size,
+                         capacity);
+    if (model)
+        memcpy(model, file->data, file->size);
+    *size = file->size;
+    return ASCC_OK;
+}
+
+ascc_status ascc_train_initial_model(ascc_train_context *context, const char *description,
+                                     uint64_t seed, void *model, size_t capacity, size_t *size)
+{
+    ASCC_FLOAT_SCOPE;
+    ascc_message message = {""};
+    ascc_model_file file;
+    if (!ascc_train_context_alive(context))
+        return ASCC_ERROR_ARGUMENT;
+    const ascc_allocator *allocator = &context->shared->allocator;
+    ascc_status status = ASCC_OK;
+    if (!description || !size) {
+        status = ascc_fail(&message, ASCC_ERROR_ARGUMENT, "initial model: a NULL argument");
+    } else {
+        status = ascc_initial_model_make(allocator, description, seed, &file, &message);
+        if (status == ASCC_OK) {
+            status = copy_model(&file, model, capacity, size, &message);
+            ascc_model_file_release(&file, allocator);
+        }
+    }
+    return status == ASCC_OK ? status : ascc_train_context_fail(context, status, &message);
 }

@@ -8,7 +8,7 @@
 #include "file/write_file.h"
 #include "trainer.h"
 
-#define FAIL(status, ...) ascc_fail(&t->message, status, __VA_ARGS__)
+#define FAIL(...) ascc_trainer_fail(t, __VA_ARGS__)
 
 /* The arrays of one block, in its order. */
 enum { WEIGHTS, AVERAGE, MOMENT1, MOMENT2, ARRAYS };
@@ -47,12 +47,13 @@ static uint64_t network_hash(const ascc_trainer *t)
 
 /* ---- Saving ---- */
 
-ascc_status ascc_trainer_save(const ascc_trainer *trainer, const char *path)
+ascc_status ascc_trainer_save(ascc_trainer *t, const char *path)
 {
     ASCC_FLOAT_SCOPE;
-    if (!ascc_trainer_alive(trainer) || !path)
+    if (!ascc_trainer_alive(t))
         return ASCC_ERROR_ARGUMENT;
-    ascc_trainer *t = (ascc_trainer *)trainer; /* a failure's message is the one change */
+    if (!path)
+        return FAIL(ASCC_ERROR_ARGUMENT, "trainer: a NULL argument");
     char header[1024];
     const size_t bytes = t->parameter_count * sizeof(float);
     int length = snprintf(header, sizeof header,
@@ -71,7 +72,9 @@ ascc_status ascc_trainer_save(const ascc_trainer *trainer, const char *path)
         size[i] = (unsigned char)((uint64_t)length >> (8 * i));
     const ascc_bytes piece[] = {
         {size, sizeof size}, {header, (size_t)length}, {t->weights, ARRAYS * bytes}};
-    return ascc_write_file(path, piece, sizeof piece / sizeof *piece, &t->message);
+    const ascc_status status =
+        ascc_write_file(path, piece, sizeof piece / sizeof *piece, &t->message);
+    return status == ASCC_OK ? status : FAIL(status, "%s", t->message.text);
 }
 
 /* ---- Loading ---- */
@@ -187,8 +190,10 @@ static ascc_status read_state(ascc_trainer *t, const char *path, ascc_safetensor
 ascc_status ascc_trainer_load(ascc_trainer *t, const char *path)
 {
     ASCC_FLOAT_SCOPE;
-    if (!ascc_trainer_alive(t) || !path)
+    if (!ascc_trainer_alive(t))
         return ASCC_ERROR_ARGUMENT;
+    if (!path)
+        return FAIL(ASCC_ERROR_ARGUMENT, "trainer: a NULL argument");
     FILE *stream = fopen(path, "rb");
     if (!stream)
         return FAIL(ASCC_ERROR_FILE, "cannot open '%s': %s", path, strerror(errno));

@@ -9,54 +9,12 @@
 #include <string.h>
 #include <time.h>
 
-#define FAIL(status, ...) ascc_fail(&t->message, status, __VA_ARGS__)
+#define FAIL(...) ascc_trainer_fail(t, __VA_ARGS__)
+#define REFUSE(status, ...) ascc_fail(&t->message, status, __VA_ARGS__) /* in creation */
 
 #define IN_VAIN 20 /* iterations in a row without any rollout that end training */
 
 /* ---- Creation ---- */
-
-static ascc_status read_options(ascc_trainer *t, const ascc_trainer_options *given)
-{
-    ascc_trainer_options *o = &t->options;
-    if (!ascc_read_struct(o, sizeof *o, given, sizeof *o))
-        return FAIL(ASCC_ERROR_ARGUMENT, "ascc_trainer_options.size is not understood");
-    if (o->stage_count < 1 || !o->stage)
-        return FAIL(ASCC_ERROR_ARGUMENT, "options: no stage");
-    for (int32_t i = 0; i < o->stage_count; i++) {
-        const ascc_training_stage *s = &o->stage[i];
-        if (s->horizon < 1 || s->horizon > 1000 || s->presteps < 0 || s->presteps > 10000 ||
-            !(s->learning_rate > 0.0) || !(s->learning_rate_end >= 0.0) ||
-            !isfinite(s->learning_rate + s->learning_rate_end) ||
-            s->end <= (i ? o->stage[i - 1].end : 0))
-            return FAIL(ASCC_ERROR_ARGUMENT,
-                        "options: stage %d: end must ascend, horizon be 1 to 1000, presteps 0 to "
-                        "10000, learning rates positive",
-                        (int)i);
-    }
-    const double numbers[] = {o->beta1,          o->beta2,       o->epsilon,
-                              o->clip,           o->average,     o->jitter,
-                              o->density_weight, o->wall_weight, o->truth_share};
-    for (size_t i = 0; i < sizeof numbers / sizeof *numbers; i++)
-        if (!(numbers[i] >= 0.0 && isfinite(numbers[i])))
-            return FAIL(ASCC_ERROR_ARGUMENT, "options: a number is negative or not finite");
-    if (o->beta1 >= 1.0 || o->beta2 >= 1.0 || o->average >= 1.0 || o->thread_count < 0 ||
-        o->batch < 0 || o->batch > 65536 || !isfinite(o->neighbor_weight) || o->truth_share > 1.0)
-        return FAIL(ASCC_ERROR_ARGUMENT,
-                    "options: beta1, beta2 and average must be below 1, truth_share "
-                    "at most 1, thread_count and batch not negative");
-    o->thread_count = o->thread_count ? o->thread_count : 1;
-    o->batch = o->batch ? o->batch : 8;
-    o->beta1 = o->beta1 > 0.0 ? o->beta1 : 0.9;
-    o->beta2 = o->beta2 > 0.0 ? o->beta2 : 0.999;
-    o->epsilon = o->epsilon > 0.0 ? o->epsilon : 1e-8;
-    o->clip = o->clip > 0.0 ? o->clip : 1.0;
-    o->neighbor_weight = o->neighbor_weight == 0.0 ? 1.0 : fmax(o->neighbor_weight, 0.0);
-    o->memory_limit = o->memory_limit ? o->memory_limit : (size_t)4 << 30;
-    t->batch = o->batch;
-    t->thread_count = o->thread_count < o->batch ? o->thread_count : o->batch;
-    t->stage_count = o->stage_count;
-    return ASCC_OK;
-}
 
 static void *take(ascc_trainer *t, size_t count, size_t element)
 {
@@ -70,6 +28,78 @@ static void give(ascc_trainer *t, void *memory, size_t count, size_t element)
 {
     if (memory)
         ascc_release(&t->allocator, memory, count, element);
+}
+
+/* The first released layouts. */
+#define FIRST_OPTIONS_SIZE sizeof(ascc_trainer_options)
+#define FIRST_STAGE_SIZE sizeof(ascc_training_stage)
+#define FIRST_SEQUENCE_SIZE sizeof(ascc_training_sequence)
+#define FIRST_REPORT_SIZE sizeof(ascc_training_report)
+_Static_assert(sizeof(void *) != 8 || FIRST_OPTIONS_SIZE == 144, "layout is part of the ABI");
+_Static_assert(FIRST_STAGE_SIZE == 32, "layout is part of the ABI");
+_Static_assert(sizeof(void *) != 8 || FIRST_SEQUENCE_SIZE == 104, "layout is part of the ABI");
+_Static_assert(sizeof(void *) != 8 || FIRST_REPORT_SIZE == 72, "layout is part of the ABI");
+
+/* Stages of the caller's size, which only grows: what this version does not know must be zeros. */
+static ascc_status read_stages(ascc_trainer *t)
+{
+    const ascc_trainer_options *o = &t->options;
+    if (o->stage_count < 1 || !o->stage)
+        return REFUSE(ASCC_ERROR_ARGUMENT, "options: no stage");
+    if (o->stage_size < FIRST_STAGE_SIZE || o->stage_size > 4096)
+        return REFUSE(ASCC_ERROR_ARGUMENT, "options: stage_size is not understood");
+    t->stage = take(t, (size_t)o->stage_count, sizeof *t->stage);
+    if (!t->stage)
+        return ASCC_ERROR_MEMORY;
+    t->stage_count = o->stage_count;
+    for (int32_t i = 0; i < o->stage_count; i++) {
+        const unsigned char *from = (const unsigned char *)o->stage + (size_t)i * o->stage_size;
+        ascc_training_stage *s = &t->stage[i];
+        memcpy(s, from, sizeof *s);
+        for (size_t k = sizeof *s; k < o->stage_size; k++)
+            if (from[k])
+                return REFUSE(ASCC_ERROR_ARGUMENT,
+                              "options: stage %d: a member that this version does not know",
+                              (int)i);
+        if (s->horizon < 1 || s->horizon > 1000 || s->presteps < 0 || s->presteps > 10000 ||
+            !(s->learning_rate > 0.0) || !(s->learning_rate_end >= 0.0) ||
+            !isfinite(s->learning_rate + s->learning_rate_end) ||
+            s->end <= (i ? t->stage[i - 1].end : 0))
+            return REFUSE(ASCC_ERROR_ARGUMENT,
+                          "options: stage %d: end must ascend, horizon be 1 to 1000, presteps 0 to "
+                          "10000, learning rates positive",
+                          (int)i);
+    }
+    return ASCC_OK;
+}
+
+static ascc_status read_options(ascc_trainer *t, const ascc_trainer_options *given)
+{
+    ascc_trainer_options *o = &t->options;
+    if (!ascc_read_struct(o, sizeof *o, given, FIRST_OPTIONS_SIZE))
+        return REFUSE(ASCC_ERROR_ARGUMENT, "ascc_trainer_options.size is not understood");
+    const double numbers[] = {o->beta1,          o->beta2,       o->epsilon,
+                              o->clip,           o->average,     o->jitter,
+                              o->density_weight, o->wall_weight, o->truth_share};
+    for (size_t i = 0; i < sizeof numbers / sizeof *numbers; i++)
+        if (!(numbers[i] >= 0.0 && isfinite(numbers[i])))
+            return REFUSE(ASCC_ERROR_ARGUMENT, "options: a number is negative or not finite");
+    if (o->beta1 >= 1.0 || o->beta2 >= 1.0 || o->average >= 1.0 || o->batch < 0 ||
+        o->batch > 65536 || !isfinite(o->neighbor_weight) || o->truth_share > 1.0)
+        return REFUSE(ASCC_ERROR_ARGUMENT,
+                      "options: beta1, beta2 and average must be below 1, truth_share at most 1, "
+                      "batch within 0 and 65536");
+    if (o->reserved)
+        return REFUSE(ASCC_ERROR_ARGUMENT, "options: reserved is not 0");
+    o->batch = o->batch ? o->batch : 8;
+    o->beta1 = o->beta1 > 0.0 ? o->beta1 : 0.9;
+    o->beta2 = o->beta2 > 0.0 ? o->beta2 : 0.999;
+    o->epsilon = o->epsilon > 0.0 ? o->epsilon : 1e-8;
+    o->clip = o->clip > 0.0 ? o->clip : 1.0;
+    o->neighbor_weight = o->neighbor_weight == 0.0 ? 1.0 : fmax(o->neighbor_weight, 0.0);
+    o->memory_limit = o->memory_limit ? o->memory_limit : (size_t)4 << 30;
+    t->batch = o->batch;
+    return read_stages(t);
 }
 
 /* A tensor that may hold no negative numbers, by its first weight. */
@@ -97,8 +127,8 @@ static ascc_status find_tensors(ascc_trainer *t)
         const ascc_tensor *tensor = &t->file.tensor[i];
         const float *weights = t->model->weights + offset;
         if (strcmp(tensor->type, "F32") != 0)
-            return FAIL(ASCC_ERROR_FORMAT, "tensor '%s' is %s; only F32 can be trained",
-                        tensor->name, tensor->type);
+            return REFUSE(ASCC_ERROR_FORMAT, "tensor '%s' is %s; only F32 can be trained",
+                          tensor->name, tensor->type);
         t->tensor[i] = (ascc_trained_tensor){.first = t->parameter_count,
                                              .count = tensor->count,
                                              .offset = offset,
@@ -113,11 +143,6 @@ static ascc_status take_arrays(ascc_trainer *t)
 {
     const size_t batch = (size_t)t->batch, threads = (size_t)t->thread_count;
     int32_t longest = 1;
-    t->stage = take(t, (size_t)t->stage_count, sizeof *t->stage);
-    if (!t->stage)
-        return ASCC_ERROR_MEMORY;
-    memcpy(t->stage, t->options.stage, (size_t)t->stage_count * sizeof *t->stage);
-    t->options.stage = t->stage;
     for (int32_t i = 0; i < t->stage_count; i++)
         longest = t->stage[i].horizon > longest ? t->stage[i].horizon : longest;
     t->worker = take(t, threads, sizeof *t->worker);
@@ -151,17 +176,11 @@ static ascc_status take_arrays(ascc_trainer *t)
 
 static ascc_status open_model(ascc_trainer *t, const void *model, size_t size)
 {
-    const ascc_context_options options = {.size = sizeof options, .thread_count = 1};
-    ascc_status status = ascc_context_create(&options, &t->context);
-    if (status == ASCC_OK)
-        status = ascc_workers_create(&t->allocator, t->thread_count, NULL, NULL, NULL, &t->workers);
-    if (status != ASCC_OK)
-        return status;
-    status = ascc_model_load_memory(t->context, model, size, &t->model);
+    ascc_status status = ascc_model_load_memory(t->context, model, size, &t->model);
     if (status != ASCC_OK) {
         char text[ASCC_MESSAGE_CAPACITY];
         ascc_context_message(t->context, text, sizeof text);
-        return FAIL(status, "%s", text);
+        return REFUSE(status, "%s", text);
     }
     t->byte_count = size;
     t->bytes = take(t, size, 1);
@@ -177,8 +196,8 @@ static ascc_status open_model(ascc_trainer *t, const void *model, size_t size)
     if (status != ASCC_OK)
         return status;
     if (!ascc_safetensors_metadata(&t->file, "network"))
-        return FAIL(ASCC_ERROR_FORMAT,
-                    "model: only files of the format 'ascc.model' can be trained");
+        return REFUSE(ASCC_ERROR_FORMAT,
+                      "model: only files of the format 'ascc.model' can be trained");
     uint64_t length = 0;
     for (int i = 7; i >= 0; i--)
         length = length << 8 | t->bytes[i];
@@ -186,30 +205,22 @@ static ascc_status open_model(ascc_trainer *t, const void *model, size_t size)
     return find_tensors(t);
 }
 
-/* Why there is no trainer, where the options have room for it. */
-static void tell(const ascc_trainer_options *options, const char *why)
+static ascc_status make(ascc_train_context *context, const ascc_trainer_options *options,
+                        const void *model, size_t model_size, ascc_trainer **trainer,
+                        ascc_message *message)
 {
-    if (options->size >= sizeof *options && options->message && options->message_size)
-        snprintf(options->message, options->message_size, "%s", why);
-}
-
-ascc_status ascc_trainer_create(const ascc_trainer_options *options, const void *model,
-                                size_t model_size, ascc_trainer **trainer)
-{
-    ASCC_FLOAT_SCOPE;
-    if (trainer)
-        *trainer = NULL;
-    if (!options || !model || !trainer)
-        return ASCC_ERROR_ARGUMENT;
-    const ascc_allocator allocator = ascc_allocator_default();
-    ascc_trainer *t = ascc_allocate(&allocator, 1, sizeof *t);
-    if (!t) {
-        tell(options, "no memory for the trainer");
-        return ASCC_ERROR_MEMORY;
-    }
+    const ascc_allocator *allocator = &context->shared->allocator;
+    ascc_trainer *t = ascc_allocate(allocator, 1, sizeof *t);
+    if (!t)
+        return ascc_fail(message, ASCC_ERROR_MEMORY, "no memory for the trainer");
     memset(t, 0, sizeof *t);
     t->magic = ASCC_TRAINER_MAGIC;
-    t->allocator = allocator;
+    t->allocator = *allocator;
+    t->shared = context->shared;
+    t->context = context->alone;
+    t->thread_count = ascc_workers_count(t->shared->workers);
+    ascc_context_retain(t->shared);
+    ascc_context_retain(t->context);
     ascc_status status = read_options(t, options);
     if (status == ASCC_OK)
         status = open_model(t, model, model_size);
@@ -217,13 +228,29 @@ ascc_status ascc_trainer_create(const ascc_trainer_options *options, const void 
         status = take_arrays(t);
     if (status == ASCC_ERROR_MEMORY)
         ascc_fail(&t->message, status, "no memory for the trainer");
-    if (status != ASCC_OK) {
-        tell(options, t->message.text);
-        ascc_trainer_destroy(&t);
-        return status;
+    if (status == ASCC_OK) {
+        *trainer = t;
+        return ASCC_OK;
     }
-    *trainer = t;
-    return ASCC_OK;
+    *message = t->message;
+    ascc_trainer_destroy(&t);
+    return status;
+}
+
+ascc_status ascc_trainer_create(ascc_train_context *context, const ascc_trainer_options *options,
+                                const void *model, size_t model_size, ascc_trainer **trainer)
+{
+    ASCC_FLOAT_SCOPE;
+    ascc_message message = {""};
+    if (trainer)
+        *trainer = NULL;
+    if (!ascc_train_context_alive(context))
+        return ASCC_ERROR_ARGUMENT;
+    const ascc_status status =
+        options && model && trainer
+            ? make(context, options, model, model_size, trainer, &message)
+            : ascc_fail(&message, ASCC_ERROR_ARGUMENT, "trainer: a NULL argument");
+    return status == ASCC_OK ? status : ascc_train_context_fail(context, status, &message);
 }
 
 void ascc_trainer_destroy(ascc_trainer **trainer)
@@ -231,6 +258,8 @@ void ascc_trainer_destroy(ascc_trainer **trainer)
     if (!trainer || !*trainer)
         return;
     ascc_trainer *t = *trainer;
+    if (!ascc_trainer_alive(t))
+        return;
     *trainer = NULL;
     const size_t batch = (size_t)t->batch, threads = (size_t)t->thread_count;
     const size_t packed = t->model ? t->model->packed.count : 0;
@@ -258,12 +287,24 @@ void ascc_trainer_destroy(ascc_trainer **trainer)
     give(t, t->bytes, t->byte_count, 1);
     give(t, t->averaged_bytes, t->byte_count, 1);
     ascc_model_destroy(&t->model);
-    if (t->workers)
-        ascc_workers_destroy(&t->workers);
-    ascc_context_destroy(&t->context);
+    ascc_context *shared = t->shared;
+    ascc_context_release(t->context);
     t->magic = 0;
-    const ascc_allocator allocator = t->allocator;
-    ascc_release(&allocator, t, 1, sizeof *t);
+    ascc_release(&shared->allocator, t, 1, sizeof *t);
+    ascc_context_release(shared);
+}
+
+ascc_status ascc_trainer_fail(ascc_trainer *t, ascc_status status, const char *format, ...)
+{
+    char text[ASCC_MESSAGE_CAPACITY];
+    va_list arguments;
+    va_start(arguments, format);
+    if (vsnprintf(text, sizeof text, format, arguments) < 0)
+        text[0] = '\0';
+    va_end(arguments);
+    ascc_fail(&t->message, status, "%s", text);
+    ascc_context_log(t->shared, t->message.text);
+    return status;
 }
 
 const char *ascc_trainer_message(const ascc_trainer *t)
@@ -304,8 +345,10 @@ void ascc_trainer_apply(ascc_trainer *t)
 ascc_status ascc_trainer_set_parameters(ascc_trainer *t, const float *values)
 {
     ASCC_FLOAT_SCOPE;
-    if (!ascc_trainer_alive(t) || !values)
+    if (!ascc_trainer_alive(t))
         return ASCC_ERROR_ARGUMENT;
+    if (!values)
+        return FAIL(ASCC_ERROR_ARGUMENT, "trainer: a NULL argument");
     for (size_t i = 0; i < t->tensor_count; i++)
         for (size_t k = t->tensor[i].first; k < t->tensor[i].first + t->tensor[i].count; k++)
             if (!isfinite(values[k]) || (t->tensor[i].damps && values[k] < 0.0f))
@@ -360,8 +403,10 @@ ascc_status ascc_trainer_gradient(ascc_trainer *t, size_t sequence, size_t frame
                                   int32_t horizon, double *loss, float *gradient)
 {
     ASCC_FLOAT_SCOPE;
-    if (!ascc_trainer_alive(t) || !loss)
+    if (!ascc_trainer_alive(t))
         return ASCC_ERROR_ARGUMENT;
+    if (!loss)
+        return FAIL(ASCC_ERROR_ARGUMENT, "trainer: a NULL argument");
     if (sequence >= t->sequence_count || frame < 1 || presteps < 0 || horizon < 1 ||
         (size_t)horizon > t->worker[0].kept_count ||
         frame + (size_t)presteps + (size_t)horizon >= t->sequence[sequence].frame_count)
@@ -393,10 +438,12 @@ ascc_status ascc_trainer_gradient(ascc_trainer *t, size_t sequence, size_t frame
 ascc_status ascc_trainer_add_sequence(ascc_trainer *t, const ascc_training_sequence *sequence)
 {
     ASCC_FLOAT_SCOPE;
-    if (!ascc_trainer_alive(t) || !sequence)
+    if (!ascc_trainer_alive(t))
         return ASCC_ERROR_ARGUMENT;
+    if (!sequence)
+        return FAIL(ASCC_ERROR_ARGUMENT, "trainer: a NULL argument");
     ascc_training_sequence given;
-    if (!ascc_read_struct(&given, sizeof given, sequence, sizeof given))
+    if (!ascc_read_struct(&given, sizeof given, sequence, FIRST_SEQUENCE_SIZE))
         return FAIL(ASCC_ERROR_ARGUMENT, "ascc_training_sequence.size is not understood");
     void *memory = t->sequence;
     if (!ascc_grow(&t->allocator, &memory, &t->sequence_capacity, t->sequence_count + 1,
@@ -408,9 +455,10 @@ ascc_status ascc_trainer_add_sequence(ascc_trainer *t, const ascc_training_seque
                                      &t->context->kernels, &t->message};
     const ascc_status status = ascc_kept_sequence_create(
         &t->sequence[t->sequence_count], &t->allocator, &t->model->plan, &given, &tools);
-    if (status == ASCC_OK)
-        t->sequence_count++;
-    return status;
+    if (status != ASCC_OK)
+        return FAIL(status, "%s", t->message.text);
+    t->sequence_count++;
+    return ASCC_OK;
 }
 
 static const ascc_training_stage *find_stage(const ascc_trainer *t, double *rate)
@@ -608,7 +656,7 @@ ascc_status ascc_trainer_iterate(ascc_trainer *t, ascc_training_report *report)
     ascc_training_report own = {0};
     if (!ascc_trainer_alive(t))
         return ASCC_ERROR_ARGUMENT;
-    if (!report || !ascc_write_struct(report, &own, sizeof own, sizeof own))
+    if (!report || !ascc_write_struct(report, &own, sizeof own, FIRST_REPORT_SIZE))
         return FAIL(ASCC_ERROR_ARGUMENT, "ascc_training_report.size is not understood");
     const double begin = now();
     const ascc_training_stage *stage = find_stage(t, &own.learning_rate);
@@ -620,7 +668,7 @@ ascc_status ascc_trainer_iterate(ascc_trainer *t, ascc_training_report *report)
     if (status != ASCC_OK)
         return status;
     memset(t->gradients, 0, (size_t)t->batch * t->model->weight_count * sizeof *t->gradients);
-    ascc_workers_run(t->workers, (size_t)t->batch, 1, run_tasks, t);
+    ascc_workers_run(t->shared->workers, (size_t)t->batch, 1, run_tasks, t);
     status = sum_up(t, &own);
     if (status == ASCC_OK) {
         if (own.skipped < t->batch)
@@ -630,6 +678,6 @@ ascc_status ascc_trainer_iterate(ascc_trainer *t, ascc_training_report *report)
     }
     own.iteration = t->iteration;
     own.seconds = now() - begin;
-    (void)ascc_write_struct(report, &own, sizeof own, sizeof own);
+    (void)ascc_write_struct(report, &own, sizeof own, FIRST_REPORT_SIZE);
     return status;
 }

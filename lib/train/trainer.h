@@ -7,6 +7,7 @@
 #include "model/model.h"
 #include "model/operation.h"
 #include "rollout.h"
+#include "train_context.h"
 
 #define ASCC_TRAINER_MAGIC 0x54435341u /* "ASCT" */
 
@@ -21,9 +22,9 @@ struct ascc_trainer {
     uint32_t magic;
     int32_t thread_count, batch, stage_count;
     ascc_allocator allocator;
-    ascc_context *context; /* one thread: rollouts run side by side, each on its own */
-    ascc_workers *workers;
-    ascc_model *model;                     /* its weights are the ones being trained */
+    ascc_context *shared;  /* retained: workers, log */
+    ascc_context *context; /* retained, one thread: rollouts run side by side, each on its own */
+    ascc_model *model;     /* its weights are the ones being trained */
     unsigned char *bytes, *averaged_bytes; /* the model file, filled in when asked for */
     size_t byte_count, header_count; /* header_count: of the bytes that weights do not change */
     ascc_safetensors file, averaged_file;
@@ -58,6 +59,10 @@ static inline bool ascc_trainer_alive(const ascc_trainer *t)
 {
     return t && t->magic == ASCC_TRAINER_MAGIC;
 }
+
+/* Keeps the line of a call that fails as the trainer's message and logs it; returns the status. */
+ascc_status ascc_trainer_fail(ascc_trainer *t, ascc_status status, const char *format, ...)
+    ASCC_PRINTF(3, 4);
 
 /* The model takes over t->weights. */
 void ascc_trainer_apply(ascc_trainer *t);
