@@ -248,6 +248,20 @@ static void other_descriptions_of_the_tests_begin(void **state)
         .bumps = 3, .moments = 2, .fluid_only = 1, .motion = 2, .walls = 1, .damping = 1};
     bytes = model_builder_random(&moments, &size);
     begins("moments", bytes, size);
+    const model_random lattice = {.dimension = 3,
+                                  .levels = 3,
+                                  .bumps = 3,
+                                  .moments = 2,
+                                  .lattice = 1,
+                                  .method = "voxel_corners",
+                                  .no_hysteresis = 1,
+                                  .transfer = 1,
+                                  .fluid_only = 1,
+                                  .motion = 3,
+                                  .walls = 1,
+                                  .damping = 1};
+    bytes = model_builder_random(&lattice, &size);
+    begins("lattice", bytes, size);
     bytes = model_builder_demo(3, 0.05, &size);
     begins("demo", bytes, size);
     for (const char *kind = "nb"; *kind; kind++) {
