@@ -56,7 +56,7 @@ static void open_lesson(lesson *s, const bench_options *o, size_t count)
     ascc_model_info info = {.size = sizeof info};
     (void)ascc_model_get_info(s->model, &info);
     float *frames = make_frames(count, 4, info.time_step);
-    const ascc_training_stage stage = {.end = 1, .horizon = 2, .learning_rate = 1e-3};
+    const ascc_training_stage stage = {.end = 1, .unroll = 2, .learning_rate = 1e-3};
     const ascc_trainer_options options = {.size = sizeof options,
                                           .stage = &stage,
                                           .stage_size = sizeof stage,
@@ -110,11 +110,11 @@ static double time_step(lesson *s)
     return bench_seconds() - begin;
 }
 
-static double time_gradient(lesson *s, int32_t horizon)
+static double time_gradient(lesson *s, int32_t unroll)
 {
     double loss;
     const double begin = bench_seconds();
-    if (ascc_trainer_gradient(s->trainer, 0, 1, 0, horizon, &loss, s->gradient))
+    if (ascc_trainer_gradient(s->trainer, 0, 1, 0, unroll, &loss, s->gradient))
         bench_fail("gradient: %s", ascc_trainer_message(s->trainer));
     return bench_seconds() - begin;
 }
@@ -129,20 +129,20 @@ void bench_train(const bench_options *o)
         "particles,steps,step_ns_per_particle,gradient_ns_per_particle_and_step,ratio,min,max");
     lesson s;
     open_lesson(&s, o, count);
-    for (int32_t horizon = 1; horizon <= 2; horizon++) {
+    for (int32_t unroll = 1; unroll <= 2; unroll++) {
         double step[BENCH_REPEATS], gradient[BENCH_REPEATS], ratio[BENCH_REPEATS];
         (void)time_step(&s);
-        (void)time_gradient(&s, horizon);
+        (void)time_gradient(&s, unroll);
         for (size_t r = 0; r < repeats; r++) {
             step[r] = time_step(&s);
-            gradient[r] = time_gradient(&s, horizon) / horizon;
+            gradient[r] = time_gradient(&s, unroll) / unroll;
             ratio[r] = gradient[r] / step[r];
         }
         const bench_spread a = bench_spread_of(step, repeats),
                            b = bench_spread_of(gradient, repeats);
         const bench_spread c = bench_spread_of(ratio, repeats);
         const double ns = 1e9 / (double)count;
-        bench_row(&table, "%zu,%d,%.1f,%.1f,%.2f,%.2f,%.2f", count, horizon, a.median * ns,
+        bench_row(&table, "%zu,%d,%.1f,%.1f,%.2f,%.2f,%.2f", count, unroll, a.median * ns,
                   b.median * ns, c.median, c.min, c.max);
     }
     close_lesson(&s);

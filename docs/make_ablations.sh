@@ -9,7 +9,7 @@ ascc=build/examples/ascc
 data=../shared/data/liquid3d/valid
 csv=$(mktemp)
 trap 'rm -f "$csv"' EXIT
-names="base no-ascc single-scale farthest no-presteps grid projection-off direction-seen no-damping"
+names="base no-ascc single-scale farthest no-warm-up grid projection-off direction-seen no-damping"
 
 for name in $names; do
     config=examples/train/ablation-$name.json

@@ -81,8 +81,7 @@ static int write_model(ascc_trainer *trainer, const char *path)
 int main(int count, char **arguments)
 {
     const ascc_context_options options = {.size = sizeof options, .thread_count = 2, .log = print};
-    const ascc_training_stage stage = {
-        .end = 10, .horizon = 2, .presteps = 2, .learning_rate = 1e-3};
+    const ascc_training_stage stage = {.end = 10, .unroll = 2, .warm_up = 2, .learning_rate = 1e-3};
     const ascc_trainer_options training = {.size = sizeof training,
                                            .seed = 1,
                                            .stage = &stage,

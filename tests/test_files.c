@@ -29,7 +29,7 @@ static int open_all(void **state)
     size_t size;
     const model_random random = {.channels = 4, .trunk_layers = 1, .cells = 3, .output_cells = 4};
     unsigned char *bytes = model_builder_random(&random, &size);
-    const ascc_training_stage stage = {.end = 10, .horizon = 1, .learning_rate = 0.001};
+    const ascc_training_stage stage = {.end = 10, .unroll = 1, .learning_rate = 0.001};
     const ascc_trainer_options options = {.size = sizeof options,
                                           .stage = &stage,
                                           .stage_size = sizeof stage,

@@ -150,7 +150,7 @@ static void steps(const ascc_model *model, const ascc_model_info *info, const dr
     ascc_particles_destroy(&particles);
 }
 
-static const ascc_training_stage stage = {.end = 2, .horizon = 1, .learning_rate = 1e-3};
+static const ascc_training_stage stage = {.end = 2, .unroll = 1, .learning_rate = 1e-3};
 
 static ascc_trainer_options training(void)
 {
@@ -491,7 +491,7 @@ static void arguments_are_checked_and_failures_logged(void **state)
     assert_non_null(strstr(log.last, "bytes"));
     unsigned char *bytes = initial(SMALL, 1, &size);
 
-    const ascc_training_stage two[2] = {stage, {.end = 4, .horizon = 1, .learning_rate = 1.0}};
+    const ascc_training_stage two[2] = {stage, {.end = 4, .unroll = 1, .learning_rate = 1.0}};
     ascc_trainer *trainer = NULL;
     ascc_trainer_options o = training();
     o.reserved = 1;
@@ -525,8 +525,8 @@ static void stages_of_a_later_version_are_read(void **state)
     const struct later {
         ascc_training_stage stage;
         double more;
-    } later[2] = {{{.end = 2, .horizon = 1, .learning_rate = 1e-3}, 0.0},
-                  {{.end = 5, .horizon = 2, .learning_rate = 1e-3}, 0.0}};
+    } later[2] = {{{.end = 2, .unroll = 1, .learning_rate = 1e-3}, 0.0},
+                  {{.end = 5, .unroll = 2, .learning_rate = 1e-3}, 0.0}};
     ascc_trainer_options o = training();
     o.stage = &later[0].stage;
     o.stage_size = sizeof later[0];

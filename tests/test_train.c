@@ -77,7 +77,7 @@ static motion *make_motion(uint64_t seed, int dimension)
 /* ---- Trainers ---- */
 
 static const ascc_training_stage only_stage = {
-    .end = 1000, .horizon = 3, .presteps = 1, .learning_rate = 1e-3};
+    .end = 1000, .unroll = 3, .warm_up = 1, .learning_rate = 1e-3};
 
 static ascc_trainer_options default_options(void)
 {
@@ -141,7 +141,7 @@ typedef struct gradient_case {
     const char *name;
     model_random random;
     oracle_loss_options loss;
-    int presteps, horizon;
+    int warm_up, unroll;
     int constant_positions;
     int samples; /* of each tensor; 0 = 12 */
 } gradient_case;
@@ -196,8 +196,8 @@ static double loss_of(bench *b, oracle_mode mode)
 {
     const oracle_sequence sequence = {FRAMES, b->m->position};
     b->o.mode = mode;
-    return oracle_loss(&b->o, &sequence, &b->references, &b->c->loss, 2, b->c->presteps,
-                       b->c->horizon);
+    return oracle_loss(&b->o, &sequence, &b->references, &b->c->loss, 2, b->c->warm_up,
+                       b->c->unroll);
 }
 
 /* Central difference of the loss by one weight. */
@@ -258,9 +258,9 @@ static double check_gradient(const gradient_case *c)
     float *gradient = calloc(count + 1, sizeof *gradient), *values = parameters_of(trainer);
     double loss = 0.0, alone = 0.0, worst = 0.0;
     assert_non_null(gradient);
-    if (ascc_trainer_gradient(trainer, 0, 2, c->presteps, c->horizon, &loss, gradient) != ASCC_OK)
+    if (ascc_trainer_gradient(trainer, 0, 2, c->warm_up, c->unroll, &loss, gradient) != ASCC_OK)
         fail_msg("%s: %s", c->name, ascc_trainer_message(trainer));
-    assert_int_equal(ascc_trainer_gradient(trainer, 0, 2, c->presteps, c->horizon, &alone, NULL),
+    assert_int_equal(ascc_trainer_gradient(trainer, 0, 2, c->warm_up, c->unroll, &alone, NULL),
                      ASCC_OK);
     assert_true(loss == alone);
     const double want = loss_of(&b, ORACLE_RECORD);
@@ -334,8 +334,8 @@ static void gradients_of_rollouts_are_right(void **state)
     for (int v = 0; v < 8; v++) {
         gradient_case c = {.name = "rollout",
                            .random = everything(1500 + (uint64_t)v, 2 + v % 2),
-                           .presteps = v / 4,
-                           .horizon = 2 + v / 6,
+                           .warm_up = v / 4,
+                           .unroll = 2 + v / 6,
                            .constant_positions = v / 2 % 2,
                            .samples = 24};
         worst = fmax(worst, check_gradient(&c));
@@ -351,7 +351,7 @@ static void gradients_with_positions_as_constants_are_right(void **state)
         gradient_case c = {.name = "constant positions",
                            .random = v / 2 ? small_basis(1600 + (uint64_t)v, 2 + v % 2)
                                            : small(1600 + (uint64_t)v, 2 + v % 2),
-                           .horizon = 3,
+                           .unroll = 3,
                            .constant_positions = 1};
         c.random.evaluate = "advected";
         worst = fmax(worst, check_gradient(&c));
@@ -370,7 +370,7 @@ static void gradients_of_penalties_are_right(void **state)
                                     : v % 3 == 1 ? -1.0
                                                  : 0.0,
                                     v % 2 ? 3.0 : 0.0, v % 3 ? 2.0 : 0.0},
-                           .horizon = 2};
+                           .unroll = 2};
         c.random.scale *= 2.0;
         worst = fmax(worst, check_gradient(&c));
     }
@@ -382,8 +382,8 @@ static void gradients_of_penalties_are_right(void **state)
 static ascc_trainer_options augmented(void)
 {
     static const ascc_training_stage stages[2] = {
-        {.end = 3, .horizon = 1, .learning_rate = 1e-3, .learning_rate_end = 5e-4},
-        {.end = 1000, .horizon = 2, .presteps = 2, .learning_rate = 5e-4}};
+        {.end = 3, .unroll = 1, .learning_rate = 1e-3, .learning_rate_end = 5e-4},
+        {.end = 1000, .unroll = 2, .warm_up = 2, .learning_rate = 5e-4}};
     ascc_trainer_options o = default_options();
     o.stage = stages;
     o.stage_count = 2;
@@ -555,7 +555,7 @@ static void a_sequence_of_another_time_step_or_too_short_is_refused(void **state
     assert_int_equal(ascc_trainer_add_sequence(trainer, &m->sequence), ASCC_ERROR_MISMATCH);
     m->sequence.time_step = TIME_STEP;
     m->sequence.frame_count =
-        3; /* one before the start, the start, one after: horizon 2 needs more */
+        3; /* one before the start, the start, one after: unroll 2 needs more */
     (void)ascc_trainer_add_sequence(trainer, &m->sequence);
     ascc_training_report report = {.size = sizeof report};
     assert_int_equal(ascc_trainer_iterate(trainer, &report), ASCC_ERROR_ARGUMENT);
@@ -605,8 +605,8 @@ static void weights_that_compute_nothing_are_taken_back(void **state)
 {
     (void)state;
     const model_random random = small(25, 2);
-    ascc_training_stage stages[] = {{.end = 3, .horizon = 1, .learning_rate = 1e-3},
-                                    {.end = 90, .horizon = 1, .learning_rate = 1e30}};
+    ascc_training_stage stages[] = {{.end = 3, .unroll = 1, .learning_rate = 1e-3},
+                                    {.end = 90, .unroll = 1, .learning_rate = 1e30}};
     ascc_trainer_options o = default_options();
     o.stage = stages;
     o.stage_count = 2;
@@ -665,11 +665,11 @@ static void twenty_iterations_without_a_gradient_stop_training(void **state)
 }
 
 /* The weights after five iterations with so many steps before. */
-static float *learned_with(int32_t presteps, double truth_share, size_t *count)
+static float *learned_with(int32_t warm_up, double truth_share, size_t *count)
 {
     const model_random random = small(26, 2);
     const ascc_training_stage stage = {
-        .end = 9, .horizon = 1, .presteps = presteps, .learning_rate = 1e-3};
+        .end = 9, .unroll = 1, .warm_up = warm_up, .learning_rate = 1e-3};
     ascc_trainer_options o = default_options();
     o.stage = &stage;
     o.truth_share = truth_share;
@@ -703,7 +703,7 @@ static void training_lowers_the_loss(void **state)
     (void)state;
     const model_random random = everything(26, 2);
     ascc_trainer_options o = default_options();
-    ascc_training_stage stage = {.end = 1000, .horizon = 2, .learning_rate = 1e-2};
+    ascc_training_stage stage = {.end = 1000, .unroll = 2, .learning_rate = 1e-2};
     o.stage = &stage;
     motion *m = make_motion(10, 2);
     for (size_t t = 1; t < FRAMES; t++) /* it rests: weights may learn to hold it against gravity */

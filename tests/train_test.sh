@@ -61,8 +61,8 @@ config() {
     "valid": ["data/wbc2d_4_0001.safetensors"]
   },
   "stages": [
-    {"iterations": 12, "horizon": 1, "learning_rate": 0.002, "learning_rate_end": 0.001},
-    {"iterations": 12, "horizon": 2, "presteps": 2, "learning_rate": 0.001}
+    {"iterations": 12, "unroll": 1, "learning_rate": 0.002, "learning_rate_end": 0.001},
+    {"iterations": 12, "unroll": 2, "warm_up": 2, "learning_rate": 0.001}
   ],
   "batch": 2, "seed": 3, "clip": 1, "average": 0.9, "jitter": 0.01, "rotate": true, "mirror": true,
   "density_weight": 0.1, "wall_weight": 0.1, "position_gradients": true, "memory": 0.5,
@@ -102,7 +102,8 @@ wrong "'network', 'description' or 'model' is wanted" 's/"network"/"networks"/'
 wrong "config: 'description' must be a text" 's/"batch"/"description": 1, "batch"/;s/"network"/"nothing"/'
 wrong "config: 'network' and 'description' exclude each other" 's/"batch"/"description": "d.json", "batch"/'
 wrong "d.json: No such file" 's/"batch"/"description": "d.json", "batch"/;s/"network"/"nothing"/'
-wrong "stage 2: 'horizon' is 0" 's/"horizon": 2/"horizon": 0/'
+wrong "stage 1: unknown key 'horizon'" 's/"unroll": 1/"unroll": 1, "horizon": 1/'
+wrong "stage 2: 'unroll' is 0" 's/"unroll": 2/"unroll": 0/'
 wrong "stage 1: unknown key 'rate'" 's/"learning_rate_end"/"rate"/'
 wrong "data: train: *_0009.safetensors: there is no such file" 's|data/[*]_0000|*_0009|'
 wrong "data: train: unknown key 'shared'" 's/"share"/"shared"/'
@@ -157,6 +158,16 @@ equals() {
         cmp whole.rows "$1.rows" >out 2>err
     report $? "$2"
 }
+
+# ---- Words of earlier versions ----
+
+config old.json old 's/"unroll"/"horizon"/;s/"warm_up"/"presteps"/'
+run train old.json --threads 1 --iterations 13
+sed '1s/unroll,warm_up/horizon,presteps/' old/m.csv >changed && mv changed old/m.csv
+run train old.json --threads 1 --resume
+holds 'an old log is gone on with' grep -q '^iteration,stage,horizon,presteps,' old/m.csv
+sed '1s/horizon,presteps/unroll,warm_up/' old/m.csv >changed && mv changed old/m.csv
+equals old 'old keys and an old log train the same bits'
 
 # ---- A description in place of an architecture ----
 
@@ -293,7 +304,7 @@ tail -c +2 "$source/tests/fuzz/corpus/cconv-f" >published
 run sim published dam-break-3d --size 5 -n 8 -o fall.safetensors
 cat >published.json <<'END'
 {"model": "published", "data": {"train": ["fall.safetensors"]}, "output": "learned.safetensors",
- "stages": [{"iterations": 2, "horizon": 1, "learning_rate": 0.001}]}
+ "stages": [{"iterations": 2, "unroll": 1, "learning_rate": 0.001}]}
 END
 run train published.json
 [ $? -eq 0 ] && "$ascc" info learned.safetensors | grep -q 'model small'

@@ -264,7 +264,7 @@ static bool save(training *t)
 /* What an iteration of a stage takes: steps back and forth, and on average half the steps before. */
 static double work_of(const ascc_training_stage *stage)
 {
-    return 3.5 * stage->horizon + 0.5 * stage->presteps;
+    return 3.5 * stage->unroll + 0.5 * stage->warm_up;
 }
 
 static double work_between(const training *t, uint64_t first, uint64_t end)

@@ -310,6 +310,12 @@ static void read_description(reading *g, json_t *root, ascc_train_config *c)
 
 /* ---- Schedule and options ------------------------------------------------------------------------- */
 
+/* The key, or what it was called once if only that is there. */
+static const char *key_of(const json_t *object, const char *key, const char *old)
+{
+    return !json_object_get(object, key) && json_object_get(object, old) ? old : key;
+}
+
 static void read_stages(reading *g, json_t *root, ascc_train_config *c)
 {
     ascc_members *r = &g->r;
@@ -329,8 +335,8 @@ static void read_stages(reading *g, json_t *root, ascc_train_config *c)
         ascc_training_stage *s = &c->stage[count++];
         end += (uint64_t)ascc_members_integer(r, stage, "iterations", 1, 1000000000);
         s->end = end;
-        s->horizon = ascc_members_integer(r, stage, "horizon", 1, 10000);
-        s->presteps = integer_or(r, stage, "presteps", 0, 10000, 0);
+        s->unroll = ascc_members_integer(r, stage, key_of(stage, "unroll", "horizon"), 1, 10000);
+        s->warm_up = integer_or(r, stage, key_of(stage, "warm_up", "presteps"), 0, 10000, 0);
         s->learning_rate = ascc_members_number(r, stage, "learning_rate", 0.0, 1.0);
         s->learning_rate_end = number_or(r, stage, "learning_rate_end", 1e-30, 1.0, 0.0);
         ascc_members_end(r, stage);

@@ -9,9 +9,11 @@
 #include <string.h>
 #include <unistd.h>
 
-static const char HEADER[] =
-    "iteration,stage,horizon,presteps,learning_rate,loss,gradient_norm,seconds,steps,ended_early,"
-    "skipped,err_n1,err_n2,rollout_last,escaped,density_error,stable\n";
+#define COLUMNS                                                                                    \
+    "learning_rate,loss,gradient_norm,seconds,steps,ended_early,"                                  \
+    "skipped,err_n1,err_n2,rollout_last,escaped,density_error,stable\n"
+static const char HEADER[] = "iteration,stage,unroll,warm_up," COLUMNS;
+static const char OLD_HEADER[] = "iteration,stage,horizon,presteps," COLUMNS; /* the same columns */
 enum { FIELDS = 17, SECONDS = 7, ERRORS = 11 };
 
 bool ascc_validation_better(const ascc_validation *a, const ascc_validation *b)
@@ -64,7 +66,8 @@ static long read_rows(FILE *file, uint64_t iteration, ascc_train_log *log)
 {
     char line[1024];
     double field[FIELDS];
-    if (!fgets(line, sizeof line, file) || strcmp(line, HEADER) != 0)
+    if (!fgets(line, sizeof line, file) ||
+        (strcmp(line, HEADER) != 0 && strcmp(line, OLD_HEADER) != 0))
         return 0;
     long end = ftell(file);
     while (fgets(line, sizeof line, file) && parse(line, field) && field[0] <= (double)iteration) {
@@ -109,7 +112,7 @@ bool ascc_train_log_add(ascc_train_log *log, int32_t stage, const ascc_training_
 {
     FILE *f = log->file;
     log->seconds += r->seconds;
-    fprintf(f, "%" PRIu64 ",%d,%d,%d,%.9g", r->iteration, stage, r->horizon, r->presteps,
+    fprintf(f, "%" PRIu64 ",%d,%d,%d,%.9g", r->iteration, stage, r->unroll, r->warm_up,
             r->learning_rate);
     add_number(f, r->loss);
     add_number(f, r->gradient_norm);

@@ -72,10 +72,10 @@ typedef struct ascc_training_sequence {
 
 /** A stretch of the schedule: until iteration `end`. */
 typedef struct ascc_training_stage {
-    uint64_t end;             /* iterations done when it is over, from the very start */
-    int32_t horizon;          /* T: steps of a rollout that the loss is taken over */
-    int32_t presteps;         /* W: steps before them without gradient; each rollout draws 0 to W */
-    double learning_rate;     /* at its beginning */
+    uint64_t end;         /* iterations done when it is over, from the very start */
+    int32_t unroll;       /* T, the unroll length: steps of a rollout that the loss is taken over */
+    int32_t warm_up;      /* W: steps before them without gradient; each rollout draws 0 to W */
+    double learning_rate; /* at its beginning */
     double learning_rate_end; /* at its end, on a geometric path; 0 = as at its beginning */
 } ascc_training_stage;
 
@@ -113,7 +113,7 @@ typedef struct ascc_training_report {
     double loss;          /* mean of Eq. 3 over steps and rollouts, particle spacings */
     double gradient_norm; /* before clipping */
     double learning_rate;
-    int32_t horizon, presteps;
+    int32_t unroll, warm_up;
     int32_t ended_early; /* rollouts whose steps without gradient blew up and were cut */
     int32_t skipped;     /* rollouts left out: their steps could not be computed */
     double seconds;      /* wall clock */
@@ -147,12 +147,12 @@ ASCC_API ascc_status ascc_trainer_add_sequence(ascc_trainer *trainer,
 ASCC_API ascc_status ascc_trainer_iterate(ascc_trainer *trainer, ascc_training_report *report);
 
 /**
- * Loss and gradient of one rollout, not augmented: `presteps` steps without gradient from `frame` >= 1,
- * then `horizon` with; the stages of the options have one as long. gradient:
+ * Loss and gradient of one rollout, not augmented: `warm_up` steps without gradient from `frame` >= 1,
+ * then `unroll` with; the stages of the options have one as long. gradient:
  * [ascc_trainer_parameter_count] or NULL (then it is not computed).
  */
 ASCC_API ascc_status ascc_trainer_gradient(ascc_trainer *trainer, size_t sequence, size_t frame,
-                                           int32_t presteps, int32_t horizon, double *loss,
+                                           int32_t warm_up, int32_t unroll, double *loss,
                                            float *gradient);
 
 /** Numbers that are trained: the tensors of the file, in the order of its data. */

@@ -137,7 +137,7 @@ static ascc_status measure(ascc_kept_sequence *s, const ascc_allocator *allocato
                            const ascc_plan *plan, const ascc_search_tools *tools)
 {
     const size_t d = (size_t)s->dimension, n = s->fluid_count * d, w = s->boundary_count * d;
-    const ascc_placement none = ascc_placement_none();
+    const ascc_rigid_transform none = ascc_rigid_transform_none();
     histogram *h = ascc_allocate(allocator, 2, sizeof *h);
     double *x = ascc_allocate(allocator, n + w, sizeof *x);
     ascc_status status = h && x ? ASCC_OK : ASCC_ERROR_MEMORY;
@@ -146,11 +146,12 @@ static ascc_status measure(ascc_kept_sequence *s, const ascc_allocator *allocato
         h[0].high = 64.0;
         h[1].low = -1.0;
         h[1].high = 1.0;
-        ascc_placement_apply(&none, s->dimension, s->wall, s->boundary_count, false, x + n);
+        ascc_rigid_transform_apply(&none, s->dimension, s->wall, s->boundary_count, false, x + n);
     }
     for (size_t f = 0; status == ASCC_OK && f < s->frame_count; f++) {
         ascc_arena_reset(tools->arena);
-        ascc_placement_apply(&none, s->dimension, s->position + f * n, s->fluid_count, false, x);
+        ascc_rigid_transform_apply(&none, s->dimension, s->position + f * n, s->fluid_count, false,
+                                   x);
         status = measure_fluid(s, plan, f, x, tools, &h[0]);
         if (status == ASCC_OK && s->boundary_count)
             status = measure_walls(s, plan, x, x + n, tools, &h[1]);
@@ -210,15 +211,15 @@ void ascc_kept_sequence_destroy(ascc_kept_sequence *s, const ascc_allocator *all
     memset(s, 0, sizeof *s);
 }
 
-/* ---- Placements ---- */
+/* ---- Rigid transforms ---- */
 
-ascc_placement ascc_placement_none(void)
+ascc_rigid_transform ascc_rigid_transform_none(void)
 {
-    return (ascc_placement){.turn = {{1.0, 0.0, 0.0}, {0.0, 1.0, 0.0}, {0.0, 0.0, 1.0}}};
+    return (ascc_rigid_transform){.turn = {{1.0, 0.0, 0.0}, {0.0, 1.0, 0.0}, {0.0, 0.0, 1.0}}};
 }
 
-void ascc_placement_apply(const ascc_placement *p, int32_t dimension, const float *from,
-                          size_t count, bool vectors, double *to)
+void ascc_rigid_transform_apply(const ascc_rigid_transform *p, int32_t dimension, const float *from,
+                                size_t count, bool vectors, double *to)
 {
     const size_t d = (size_t)dimension;
     for (size_t i = 0; i < count; i++, from += d, to += d)
@@ -283,10 +284,10 @@ static void make_turn(double turn[3][3], const double axis[3], double cosine, do
         }
 }
 
-ascc_placement ascc_placement_draw(ascc_random *random, const ascc_kept_sequence *s, bool rotate,
-                                   bool mirror, double edge)
+ascc_rigid_transform ascc_rigid_transform_draw(ascc_random *random, const ascc_kept_sequence *s,
+                                               bool rotate, bool mirror, double edge)
 {
-    ascc_placement p = ascc_placement_none();
+    ascc_rigid_transform p = ascc_rigid_transform_none();
     const bool flat = s->dimension == 2;
     double axis[3] = {0.0, 0.0, 1.0}, down[3], across[3], cosine = 1.0, sine = 0.0;
     memcpy(down, s->gravity, sizeof down);

@@ -27,18 +27,19 @@ ascc_status ascc_kept_sequence_create(ascc_kept_sequence *sequence, const ascc_a
 void ascc_kept_sequence_destroy(ascc_kept_sequence *sequence, const ascc_allocator *allocator);
 
 /* A motion of the whole scene: x -> turn x + shift. */
-typedef struct ascc_placement {
+typedef struct ascc_rigid_transform {
     double turn[3][3], shift[3];
-} ascc_placement;
+} ascc_rigid_transform;
 
-ascc_placement ascc_placement_none(void);
+ascc_rigid_transform ascc_rigid_transform_none(void);
 /* to[count][d] = the placed points; vectors are turned only. */
-void ascc_placement_apply(const ascc_placement *placement, int32_t dimension, const float *from,
-                          size_t count, bool vectors, double *to);
+void ascc_rigid_transform_apply(const ascc_rigid_transform *transform, int32_t dimension,
+                                const float *from, size_t count, bool vectors, double *to);
 
 /* A turn about gravity (without gravity: about any axis), a mirror in a plane along it, and a shift
  * within a cube of this edge. */
-ascc_placement ascc_placement_draw(ascc_random *random, const ascc_kept_sequence *sequence,
-                                   bool rotate, bool mirror, double edge);
+ascc_rigid_transform ascc_rigid_transform_draw(ascc_random *random,
+                                               const ascc_kept_sequence *sequence, bool rotate,
+                                               bool mirror, double edge);
 
 #endif

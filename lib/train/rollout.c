@@ -9,12 +9,12 @@
 #define BLOWN_UP 2.0
 
 bool ascc_rollout_worker_open(ascc_rollout_worker *w, ascc_context *context,
-                              const ascc_model *model, int32_t longest_horizon)
+                              const ascc_model *model, int32_t longest_unroll)
 {
     memset(w, 0, sizeof *w);
     w->context = context;
     w->model = model;
-    w->kept_count = (size_t)longest_horizon;
+    w->kept_count = (size_t)longest_unroll;
     ascc_arena_open(&w->scratch, &context->allocator);
     ascc_arena_open(&w->loss_scratch, &context->allocator);
     w->kept = ascc_allocate(&context->allocator, w->kept_count, sizeof *w->kept);
@@ -57,8 +57,8 @@ typedef struct rollout {
     size_t numbers, walls; /* coordinates of the fluid, of the walls */
     double *wall, *normal; /* [boundary][dimension] */
     double *truth;
-    double *state;     /* [horizon + 1] positions before each step, and after the last */
-    int64_t *momentum; /* [horizon] before each step */
+    double *state;     /* [unroll + 1] positions before each step, and after the last */
+    int64_t *momentum; /* [unroll] before each step */
     double *by_position, *by_velocity, *seen, *place, *velocity;
     size_t first_frame; /* of the first step with gradient: state 0 is there */
 } rollout;
@@ -66,7 +66,7 @@ typedef struct rollout {
 static bool take_memory(rollout *r)
 {
     ascc_rollout_worker *w = r->worker;
-    const size_t states = (size_t)r->task->horizon + 1, n = r->numbers;
+    const size_t states = (size_t)r->task->unroll + 1, n = r->numbers;
     const size_t count = 2 * r->walls + n + 2 * states * n + 5 * n;
     void *memory = w->memory;
     if (!ascc_grow(&w->context->allocator, &memory, &w->memory_count, count, sizeof *w->memory))
@@ -88,8 +88,8 @@ static bool take_memory(rollout *r)
 static void truth_at(const rollout *r, size_t frame, double *to)
 {
     const ascc_kept_sequence *s = r->task->sequence;
-    ascc_placement_apply(&r->task->placement, s->dimension, s->position + frame * r->numbers,
-                         s->fluid_count, false, to);
+    ascc_rigid_transform_apply(&r->task->transform, s->dimension, s->position + frame * r->numbers,
+                               s->fluid_count, false, to);
 }
 
 /* Puts the particles where the sequence has them, with velocities by frame difference. */
@@ -119,10 +119,10 @@ static ascc_status open_particles(rollout *r)
                                             .mass = 1, /* equal masses cancel */
                                             .fluid_capacity = s->fluid_count,
                                             .boundary_capacity = s->boundary_count};
-    ascc_placement_apply(&r->task->placement, s->dimension, s->wall, s->boundary_count, false,
-                         r->wall);
-    ascc_placement_apply(&r->task->placement, s->dimension, s->normal, s->boundary_count, true,
-                         r->normal);
+    ascc_rigid_transform_apply(&r->task->transform, s->dimension, s->wall, s->boundary_count, false,
+                               r->wall);
+    ascc_rigid_transform_apply(&r->task->transform, s->dimension, s->normal, s->boundary_count,
+                               true, r->normal);
     truth_at(r, r->task->frame, r->truth);
     const ascc_const_array position = {.data = r->truth, .scalar = ASCC_DOUBLE};
     const ascc_const_array wall = {.data = r->wall, .scalar = ASCC_DOUBLE};
@@ -159,13 +159,13 @@ static bool blown_up(const rollout *r, size_t frame)
     return !(sum * (double)d <= BLOWN_UP * r->plan->spacing * (double)r->numbers);
 }
 
-/* Steps without gradient; where they blow up, the rest begins at the true state. */
+/* Warm-up: steps without gradient; where they blow up, the rest begins at the true state. */
 static void prepare(rollout *r, ascc_rollout_result *result)
 {
     ascc_random random = r->task->random;
     start_at(r, r->task->frame, &random);
     r->first_frame = r->task->frame;
-    for (int32_t w = 0; w < r->task->presteps; w++) {
+    for (int32_t w = 0; w < r->task->warm_up; w++) {
         const ascc_status status = step_into(r, 0);
         r->first_frame++;
         result->steps++;
@@ -190,21 +190,21 @@ static void restore_state(rollout *r, size_t t)
 }
 
 /* Steps whose arenas are kept: the last ones, as many as fit. */
-static size_t count_kept(const rollout *r, size_t horizon)
+static size_t count_kept(const rollout *r, size_t unroll)
 {
     const size_t size = ascc_arena_size(&r->worker->kept[0]) + 1;
     const size_t fit = r->task->memory_limit / size;
-    return fit < 1 ? 1 : fit < horizon ? fit : horizon;
+    return fit < 1 ? 1 : fit < unroll ? fit : unroll;
 }
 
-static ascc_status loss_at(rollout *r, size_t t, size_t horizon, double *loss, double *gradient)
+static ascc_status loss_at(rollout *r, size_t t, size_t unroll, double *loss, double *gradient)
 {
     ascc_message message;
     const ascc_search_tools tools = {&r->worker->loss_scratch, r->worker->context->workers,
                                      &r->worker->context->kernels, &message};
     truth_at(r, r->first_frame + t, r->truth);
     return ascc_loss_of(r->task, r->plan, &tools, r->state + t * r->numbers, r->truth, r->wall,
-                        r->normal, r->first_frame + t, 1.0 / (double)horizon, loss, gradient);
+                        r->normal, r->first_frame + t, 1.0 / (double)unroll, loss, gradient);
 }
 
 /* Gradients after a step become those before it. */
@@ -242,38 +242,38 @@ static ascc_status step_back(rollout *r, size_t t, const ascc_step_state *state,
 /* Steps with gradient, forwards. Returns how many could be computed. */
 static size_t go_forwards(rollout *r, ascc_rollout_result *result, size_t *kept_from)
 {
-    const size_t horizon = (size_t)r->task->horizon;
-    size_t kept = horizon;
-    for (size_t t = 0; t < horizon; t++) {
+    const size_t unroll = (size_t)r->task->unroll;
+    size_t kept = unroll;
+    for (size_t t = 0; t < unroll; t++) {
         keep_state(r, t);
-        const bool kept_step = t == 0 || t >= horizon - kept;
+        const bool kept_step = t == 0 || t >= unroll - kept;
         const ascc_status status = step_into(r, kept_step ? t % r->worker->kept_count : 0);
         if (t == 0)
-            kept = count_kept(r, horizon);
+            kept = count_kept(r, unroll);
         result->status = status == ASCC_ERROR_MEMORY ? status : result->status;
         if (status != ASCC_OK)
             return t;
         result->steps++;
     }
-    keep_state(r, horizon);
-    *kept_from = horizon - kept;
-    return horizon;
+    keep_state(r, unroll);
+    *kept_from = unroll - kept;
+    return unroll;
 }
 
 static void go_back(rollout *r, ascc_rollout_result *result, size_t kept_from, float *packed,
                     float *gradient)
 {
-    const size_t horizon = (size_t)r->task->horizon, n = r->numbers;
+    const size_t unroll = (size_t)r->task->unroll, n = r->numbers;
     const ascc_model *model = r->worker->model;
     double unused = 0.0;
     memset(packed, 0, model->packed.count * sizeof *packed);
     memset(r->by_position, 0, n * sizeof *r->by_position);
     memset(r->by_velocity, 0, n * sizeof *r->by_velocity);
-    for (size_t t = horizon; t > 0 && result->status == ASCC_OK; t--) {
+    for (size_t t = unroll; t > 0 && result->status == ASCC_OK; t--) {
         size_t arena = t - 1;
-        result->status = loss_at(r, t, horizon, &unused, r->by_position);
+        result->status = loss_at(r, t, unroll, &unused, r->by_position);
         if (result->status == ASCC_OK && t - 1 < kept_from && t - 1 > 0) {
-            arena = horizon - 1; /* the last step's: no longer needed */
+            arena = unroll - 1; /* the last step's: no longer needed */
             restore_state(r, t - 1);
             result->status = step_into(r, arena);
         } else if (result->status == ASCC_OK && t == 1 && kept_from > 0) {
@@ -292,23 +292,23 @@ ascc_rollout_result ascc_rollout_run(ascc_rollout_worker *worker, const ascc_tra
 {
     ascc_rollout_result result = {.status = ASCC_OK};
     const ascc_plan *plan = &worker->model->plan;
-    const size_t d = (size_t)plan->dimension, horizon = (size_t)task->horizon;
+    const size_t d = (size_t)plan->dimension, unroll = (size_t)task->unroll;
     rollout r = {.worker = worker, .transposed = transposed, .task = task, .plan = plan};
     r.numbers = task->sequence->fluid_count * d;
     r.walls = task->sequence->boundary_count * d;
     r.motion = (ascc_motion){.time_step = worker->step->time_step, .advection = plan->advection};
     for (size_t c = 0; c < d; c++)
         for (size_t k = 0; k < d; k++)
-            r.motion.gravity[c] += task->placement.turn[c][k] * task->sequence->gravity[k];
+            r.motion.gravity[c] += task->transform.turn[c][k] * task->sequence->gravity[k];
     result.status = take_memory(&r) ? open_particles(&r) : ASCC_ERROR_MEMORY;
     if (result.status == ASCC_OK) {
         size_t kept_from = 0;
         prepare(&r, &result);
         const size_t done = go_forwards(&r, &result, &kept_from);
         result.failed_frame = r.first_frame + done;
-        for (size_t t = 1; t <= done && done == horizon && result.status == ASCC_OK; t++)
-            result.status = loss_at(&r, t, horizon, &result.loss, NULL);
-        result.skipped = done < horizon;
+        for (size_t t = 1; t <= done && done == unroll && result.status == ASCC_OK; t++)
+            result.status = loss_at(&r, t, unroll, &result.loss, NULL);
+        result.skipped = done < unroll;
         if (!result.skipped && result.status == ASCC_OK && task->backward && isfinite(result.loss))
             go_back(&r, &result, kept_from, packed, gradient);
         if (result.status == ASCC_ERROR_RANGE) { /* a loss of particles beyond all bounds */

@@ -11,8 +11,8 @@
 typedef struct ascc_rollout_task {
     const ascc_kept_sequence *sequence;
     size_t frame; /* where it starts, >= 1 */
-    int32_t presteps, horizon;
-    ascc_placement placement;
+    int32_t warm_up, unroll;
+    ascc_rigid_transform transform;
     double jitter;      /* m and, over a time step, m/s */
     ascc_random random; /* of the jitter */
     double neighbor_weight, density_weight, wall_weight;
@@ -45,7 +45,7 @@ typedef struct ascc_rollout_worker {
 } ascc_rollout_worker;
 
 bool ascc_rollout_worker_open(ascc_rollout_worker *worker, ascc_context *context,
-                              const ascc_model *model, int32_t longest_horizon);
+                              const ascc_model *model, int32_t longest_unroll);
 void ascc_rollout_worker_close(ascc_rollout_worker *worker);
 
 /* gradient: [weight count of the model], laid out as its weights, is added to; packed: scratch, as large as

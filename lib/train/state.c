@@ -180,7 +180,7 @@ static ascc_status read_state(ascc_trainer *t, const char *path, ascc_safetensor
         memcpy(t->weights, state, count * sizeof *state);
         t->iteration = iteration;
         t->changed = false;
-        t->in_vain = t->deaf = 0;
+        t->failed_iterations = t->zero_gradient_count = 0;
         ascc_trainer_apply(t);
     }
     ascc_release(&t->allocator, state, count, sizeof *state);

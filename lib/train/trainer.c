@@ -12,7 +12,7 @@
 #define FAIL(...) ascc_trainer_fail(t, __VA_ARGS__)
 #define REFUSE(status, ...) ascc_fail(&t->message, status, __VA_ARGS__) /* in creation */
 
-#define IN_VAIN 20 /* iterations in a row without any rollout that end training */
+#define MOST_FAILURES 20 /* iterations in a row without any rollout that end training */
 
 /* ---- Creation ---- */
 
@@ -61,12 +61,12 @@ static ascc_status read_stages(ascc_trainer *t)
                 return REFUSE(ASCC_ERROR_ARGUMENT,
                               "options: stage %d: a member that this version does not know",
                               (int)i);
-        if (s->horizon < 1 || s->horizon > 1000 || s->presteps < 0 || s->presteps > 10000 ||
+        if (s->unroll < 1 || s->unroll > 1000 || s->warm_up < 0 || s->warm_up > 10000 ||
             !(s->learning_rate > 0.0) || !(s->learning_rate_end >= 0.0) ||
             !isfinite(s->learning_rate + s->learning_rate_end) ||
             s->end <= (i ? t->stage[i - 1].end : 0))
             return REFUSE(ASCC_ERROR_ARGUMENT,
-                          "options: stage %d: end must ascend, horizon be 1 to 1000, presteps 0 to "
+                          "options: stage %d: end must ascend, unroll be 1 to 1000, warm_up 0 to "
                           "10000, learning rates positive",
                           (int)i);
     }
@@ -144,7 +144,7 @@ static ascc_status take_arrays(ascc_trainer *t)
     const size_t batch = (size_t)t->batch, threads = (size_t)t->thread_count;
     int32_t longest = 1;
     for (int32_t i = 0; i < t->stage_count; i++)
-        longest = t->stage[i].horizon > longest ? t->stage[i].horizon : longest;
+        longest = t->stage[i].unroll > longest ? t->stage[i].unroll : longest;
     t->worker = take(t, threads, sizeof *t->worker);
     for (size_t i = 0; t->worker && i < threads; i++)
         if (!ascc_rollout_worker_open(&t->worker[i], t->context, t->model, longest))
@@ -379,7 +379,7 @@ static ascc_rollout_task make_task(const ascc_trainer *t, size_t sequence)
 {
     return (ascc_rollout_task){
         .sequence = &t->sequence[sequence],
-        .placement = ascc_placement_none(),
+        .transform = ascc_rigid_transform_none(),
         .neighbor_weight = t->options.neighbor_weight,
         .density_weight = t->options.density_weight,
         .wall_weight = t->options.wall_weight,
@@ -399,23 +399,23 @@ static ascc_status rollout_failure(ascc_trainer *t, const ascc_rollout_task *tas
                 result->failed_frame, ascc_status_text(result->status));
 }
 
-ascc_status ascc_trainer_gradient(ascc_trainer *t, size_t sequence, size_t frame, int32_t presteps,
-                                  int32_t horizon, double *loss, float *gradient)
+ascc_status ascc_trainer_gradient(ascc_trainer *t, size_t sequence, size_t frame, int32_t warm_up,
+                                  int32_t unroll, double *loss, float *gradient)
 {
     ASCC_FLOAT_SCOPE;
     if (!ascc_trainer_alive(t))
         return ASCC_ERROR_ARGUMENT;
     if (!loss)
         return FAIL(ASCC_ERROR_ARGUMENT, "trainer: a NULL argument");
-    if (sequence >= t->sequence_count || frame < 1 || presteps < 0 || horizon < 1 ||
-        (size_t)horizon > t->worker[0].kept_count ||
-        frame + (size_t)presteps + (size_t)horizon >= t->sequence[sequence].frame_count)
+    if (sequence >= t->sequence_count || frame < 1 || warm_up < 0 || unroll < 1 ||
+        (size_t)unroll > t->worker[0].kept_count ||
+        frame + (size_t)warm_up + (size_t)unroll >= t->sequence[sequence].frame_count)
         return FAIL(ASCC_ERROR_ARGUMENT,
-                    "no such sequence, or frame, presteps and horizon lie beyond it or the stages");
+                    "no such sequence, or frame, warm_up and unroll lie beyond it or the stages");
     ascc_rollout_task task = make_task(t, sequence);
     task.frame = frame;
-    task.presteps = presteps;
-    task.horizon = horizon;
+    task.warm_up = warm_up;
+    task.unroll = unroll;
     task.backward = gradient != NULL;
     memset(t->gradients, 0, t->model->weight_count * sizeof *t->gradients);
     const ascc_rollout_result result =
@@ -477,9 +477,9 @@ static const ascc_training_stage *find_stage(const ascc_trainer *t, double *rate
 
 /* Frames that a rollout with this many steps can start from. */
 static size_t starts_of(const ascc_kept_sequence *s, const ascc_training_stage *stage,
-                        int32_t presteps)
+                        int32_t warm_up)
 {
-    const size_t steps = (size_t)presteps + (size_t)stage->horizon;
+    const size_t steps = (size_t)warm_up + (size_t)stage->unroll;
     return s->frame_count > steps + 1 ? s->frame_count - 1 - steps : 0;
 }
 
@@ -487,14 +487,14 @@ static ascc_status draw_task(ascc_trainer *t, const ascc_training_stage *stage, 
 {
     ascc_random random = ascc_random_open(t->options.seed, t->iteration, b);
     const double share = t->options.truth_share, drawn = ascc_random_uniform(&random);
-    const double presteps =
-        drawn < share ? 0.0 : (drawn - share) / (1.0 - share) * (stage->presteps + 1.0);
+    const double warm_up =
+        drawn < share ? 0.0 : (drawn - share) / (1.0 - share) * (stage->warm_up + 1.0);
     double sum = 0.0, edge = t->model->plan.spacing;
     for (size_t i = 0; i < t->sequence_count; i++)
         sum += starts_of(&t->sequence[i], stage, 0) ? t->sequence[i].share : 0.0;
     if (sum == 0.0)
         return FAIL(ASCC_ERROR_ARGUMENT, "no sequence is long enough for %d steps",
-                    (int)stage->horizon);
+                    (int)stage->unroll);
     double at = ascc_random_uniform(&random) * sum;
     size_t chosen = 0;
     for (size_t i = 0; i < t->sequence_count; i++) {
@@ -508,16 +508,16 @@ static ascc_status draw_task(ascc_trainer *t, const ascc_training_stage *stage, 
     t->drawn[b] = chosen;
     ascc_rollout_task *task = &t->task[b];
     *task = make_task(t, chosen);
-    task->horizon = stage->horizon;
-    task->presteps = (int32_t)presteps;
-    while (!starts_of(task->sequence, stage, task->presteps))
-        task->presteps--;
+    task->unroll = stage->unroll;
+    task->warm_up = (int32_t)warm_up;
+    while (!starts_of(task->sequence, stage, task->warm_up))
+        task->warm_up--;
     task->frame = 1 + (size_t)(ascc_random_uniform(&random) *
-                               (double)starts_of(task->sequence, stage, task->presteps));
+                               (double)starts_of(task->sequence, stage, task->warm_up));
     for (int32_t l = 1; l < t->model->plan.level_count; l++)
         edge = fmax(edge, t->model->plan.level[l].voxel);
-    task->placement = ascc_placement_draw(&random, task->sequence, t->options.rotate != 0,
-                                          t->options.mirror != 0, edge);
+    task->transform = ascc_rigid_transform_draw(&random, task->sequence, t->options.rotate != 0,
+                                                t->options.mirror != 0, edge);
     task->jitter = t->options.jitter * t->model->plan.spacing;
     task->random = random;
     return ASCC_OK;
@@ -606,26 +606,26 @@ static void learn(ascc_trainer *t, const ascc_training_report *report)
     memcpy(t->before, t->weights, 4 * t->parameter_count * sizeof *t->weights);
     t->before_iteration = t->iteration;
     t->changed = true;
-    t->in_vain = 0;
+    t->failed_iterations = 0;
     adam(t, report->learning_rate, report->gradient_norm);
     ascc_trainer_apply(t);
 }
 
 /* Many iterations in a row without any rollout learn nothing: the last change of the weights was one
  * too many, and is taken back. */
-static ascc_status count_in_vain(ascc_trainer *t)
+static ascc_status count_failed_iterations(ascc_trainer *t)
 {
     const ascc_rollout_task *task = &t->task[t->batch - 1];
     const size_t frame = t->result[t->batch - 1].failed_frame;
-    if (++t->in_vain < IN_VAIN)
+    if (++t->failed_iterations < MOST_FAILURES)
         return ASCC_OK;
-    t->in_vain = 0;
+    t->failed_iterations = 0;
     if (!t->changed)
         return FAIL(
             ASCC_ERROR_NOT_FINITE,
             "sequence %s, frame %zu: the step could not be computed, nor any rollout of the "
             "%d iterations before",
-            task->sequence->name, frame, IN_VAIN - 1);
+            task->sequence->name, frame, MOST_FAILURES - 1);
     memcpy(t->weights, t->before, 4 * t->parameter_count * sizeof *t->weights);
     t->iteration = t->before_iteration;
     t->changed = false;
@@ -633,21 +633,22 @@ static ascc_status count_in_vain(ascc_trainer *t)
     return FAIL(ASCC_ERROR_NOT_FINITE,
                 "sequence %s, frame %zu: the step could not be computed, nor any rollout of the %d "
                 "iterations before; back at iteration %" PRIu64 ", the last with weights that do",
-                task->sequence->name, frame, IN_VAIN - 1, t->iteration);
+                task->sequence->name, frame, MOST_FAILURES - 1, t->iteration);
 }
 
 /* Where all channels of a layer are negative for every particle, nothing behind them is heard of again. */
-static ascc_status count_deaf(ascc_trainer *t, const ascc_training_report *report)
+static ascc_status count_zero_gradients(ascc_trainer *t, const ascc_training_report *report)
 {
-    t->deaf = report->gradient_norm == 0.0 && report->loss > 0.0 ? t->deaf + 1 : 0;
-    if (t->deaf < IN_VAIN)
+    t->zero_gradient_count =
+        report->gradient_norm == 0.0 && report->loss > 0.0 ? t->zero_gradient_count + 1 : 0;
+    if (t->zero_gradient_count < MOST_FAILURES)
         return ASCC_OK;
-    t->deaf = 0;
+    t->zero_gradient_count = 0;
     return FAIL(
         ASCC_ERROR_RANGE,
         "the gradient was exactly 0 in the last %d iterations: all channels of a layer are off for "
         "good; go on from an earlier model, with a smaller learning rate",
-        IN_VAIN);
+        MOST_FAILURES);
 }
 
 ascc_status ascc_trainer_iterate(ascc_trainer *t, ascc_training_report *report)
@@ -660,8 +661,8 @@ ascc_status ascc_trainer_iterate(ascc_trainer *t, ascc_training_report *report)
         return FAIL(ASCC_ERROR_ARGUMENT, "ascc_training_report.size is not understood");
     const double begin = now();
     const ascc_training_stage *stage = find_stage(t, &own.learning_rate);
-    own.horizon = stage->horizon;
-    own.presteps = stage->presteps;
+    own.unroll = stage->unroll;
+    own.warm_up = stage->warm_up;
     ascc_status status = ASCC_OK;
     for (int32_t b = 0; b < t->batch && status == ASCC_OK; b++)
         status = draw_task(t, stage, (size_t)b);
@@ -674,7 +675,8 @@ ascc_status ascc_trainer_iterate(ascc_trainer *t, ascc_training_report *report)
         if (own.skipped < t->batch)
             learn(t, &own);
         t->iteration++;
-        status = own.skipped == t->batch ? count_in_vain(t) : count_deaf(t, &own);
+        status =
+            own.skipped == t->batch ? count_failed_iterations(t) : count_zero_gradients(t, &own);
     }
     own.iteration = t->iteration;
     own.seconds = now() - begin;

@@ -49,9 +49,9 @@ struct ascc_trainer {
     float *weights, *average, *moment1, *moment2;
     float *before; /* the same four before the weights last changed */
     uint64_t before_iteration;
-    int32_t in_vain; /* iterations of late without any rollout */
-    int32_t deaf;    /* iterations of late without any gradient */
-    bool changed;    /* there is a before */
+    int32_t failed_iterations;   /* iterations of late without any rollout */
+    int32_t zero_gradient_count; /* iterations of late without any gradient */
+    bool changed;                /* there is a before */
     ascc_message message;
 };
 

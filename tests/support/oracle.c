@@ -1049,7 +1049,7 @@ static double frame_loss(const oracle *o, const double *x, const double *y,
 }
 
 double oracle_loss(oracle *o, const oracle_sequence *sequence, const oracle_references *references,
-                   const oracle_loss_options *options, size_t frame, int presteps, int horizon)
+                   const oracle_loss_options *options, size_t frame, int warm_up, int unroll)
 {
     const size_t numbers = o->fluid_count * (size_t)o->model->plan.dimension;
     double *x = take(numbers, sizeof *x), *v = take(numbers, sizeof *v);
@@ -1060,12 +1060,12 @@ double oracle_loss(oracle *o, const oracle_sequence *sequence, const oracle_refe
         v[k] = (x[k] - y[k]) / o->model->plan.time_step;
     o->step = 0;
     const double *moved = o->weight;
-    for (int t = 1; t <= presteps + horizon; t++) {
-        o->weight = t <= presteps && o->still ? o->still : moved;
+    for (int t = 1; t <= warm_up + unroll; t++) {
+        o->weight = t <= warm_up && o->still ? o->still : moved;
         oracle_step(o, x, v, NULL);
         true_frame(o, sequence, frame + (size_t)t, y);
-        if (t > presteps)
-            loss += frame_loss(o, x, y, options, references) / horizon;
+        if (t > warm_up)
+            loss += frame_loss(o, x, y, options, references) / unroll;
     }
     o->weight = moved;
     free(y);

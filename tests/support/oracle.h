@@ -74,8 +74,8 @@ typedef struct oracle_references {
 } oracle_references;
 oracle_references oracle_measure(const oracle *o, const oracle_sequence *sequence);
 
-/* The loss of docs/training.md: `presteps` steps from a frame, then `horizon` that count. */
+/* The loss of docs/training.md: `warm_up` steps from a frame, then `unroll` that count. */
 double oracle_loss(oracle *o, const oracle_sequence *sequence, const oracle_references *references,
-                   const oracle_loss_options *options, size_t frame, int presteps, int horizon);
+                   const oracle_loss_options *options, size_t frame, int warm_up, int unroll);
 
 #endif
