@@ -427,6 +427,8 @@ static void descriptions_that_do_not_tell_a_shape_are_refused_by_name(void **sta
                       "{\"type\":\"dense\",\"source\":\"fluid\",\"weight\":\"k\"}" TAIL,
             "'k' has the shape [1, 4, 4, 3, 6], but must have [3, 6]");
     refused(HEAD GRID ",\"cells\":[4,4,1],\"outputs\":7}" TAIL, "columns [0, 7)");
+    refused(HEAD "{\"type\":\"dense\",\"source\":\"fluid\",\"weight\":\"__metadata__\"}" TAIL,
+            "'__metadata__'");
     refused(HEAD "{\"type\":\"identity\",\"source\":\"fluid\",\"outputs\":6}" TAIL,
             "'outputs' is 6, but a term gives 3 channels");
     refused(HEAD "{\"type\":\"dense\",\"source\":\"fluid\",\"column\":6,\"weight\":\"w\"}" TAIL,

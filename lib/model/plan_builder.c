@@ -211,6 +211,8 @@ static ascc_status list_tensor(ascc_plan_builder *builder, const char *name,
         if (!ascc_multiply_size(tensor.count, wanted->shape[i], &tensor.count))
             return FAIL("tensor '%s' is too large", ascc_quote(name).text);
     }
+    if (strcmp(name, "__metadata__") == 0)
+        return FAIL("a tensor cannot be called '%s'", name);
     if (builder->tensor_count == builder->tensor_capacity)
         return FAIL("more than %d tensors", ASCC_SAFETENSORS_MAX_TENSORS);
     char *copy = ascc_allocate(&builder->allocator, strlen(name) + 1, 1);

@@ -17,9 +17,13 @@
 
 static ascc_trainer *open_trainer(void)
 {
-    static const ascc_training_stage stage = {.end = 1000, .horizon = 1, .learning_rate = 1e-3};
-    const ascc_trainer_options options = {
-        .size = sizeof options, .batch = 1, .stage = &stage, .stage_count = 1, .average = 0.9};
+    static const ascc_training_stage stage = {.end = 1000, .unroll = 1, .learning_rate = 1e-3};
+    const ascc_trainer_options options = {.size = sizeof options,
+                                          .batch = 1,
+                                          .stage = &stage,
+                                          .stage_size = sizeof stage,
+                                          .stage_count = 1,
+                                          .average = 0.9};
     float x[3 * 4 * 2];
     for (size_t k = 0; k < 3 * 4 * 2; k++)
         x[k] = 0.05f * (float)(k % 2 ? k / 4 % 2 : k / 2 % 2) + 1e-4f * (float)(k / 8);
@@ -30,10 +34,13 @@ static ascc_trainer *open_trainer(void)
                                              .position = x,
                                              .time_step = 0.005,
                                              .gravity = {0.0, -9.81, 0.0}};
+    ascc_train_context *context = NULL;
     ascc_trainer *trainer = NULL;
     size_t size;
     unsigned char *bytes = model_builder_random(&trainees[1], &size);
-    fuzz_require(ascc_trainer_create(&options, bytes, size, &trainer) == ASCC_OK);
+    fuzz_require(ascc_train_context_create(NULL, &context) == ASCC_OK);
+    fuzz_require(ascc_trainer_create(context, &options, bytes, size, &trainer) == ASCC_OK);
+    ascc_train_context_destroy(&context);
     fuzz_require(ascc_trainer_add_sequence(trainer, &sequence) == ASCC_OK);
     free(bytes);
     return trainer;

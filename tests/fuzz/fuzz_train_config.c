@@ -20,43 +20,67 @@ static void check(const ascc_train_config *c)
     check_path(c->log);
     check_path(c->chart);
     check_path(c->checkpoint);
-    fuzz_require(c->output[0] != '\0' && (c->described || c->model[0] != '\0'));
+    fuzz_require(c->output[0] != '\0' && (c->network || c->model[0] != '\0'));
     fuzz_require(c->options.stage_count >= 1 && c->options.stage_count <= ASCC_TRAIN_STAGES);
     for (int32_t i = 0; i < c->options.stage_count; i++) {
-        fuzz_require(c->stage[i].end > end && c->stage[i].horizon >= 1);
+        fuzz_require(c->stage[i].end > end && c->stage[i].unroll >= 1);
         end = c->stage[i].end;
     }
     for (size_t i = 0; i < c->train.count; i++)
         fuzz_require(c->train.source[i].path[0] != '\0' && c->train.source[i].every >= 1);
 }
 
-/* Small enough for a few milliseconds. */
-static bool small(const ascc_architecture *a)
+/* Memory for networks of a few milliseconds. */
+enum { MOST = 1 << 20 };
+
+static void *allocate(void *user, size_t size, size_t alignment)
 {
-    bool is = a->channels <= 16 && a->fine_layers <= 4 && a->coarse_layers <= 3;
-    for (int i = 0; i < ASCC_ARCHITECTURE_LEVELS; i++)
-        is = is && a->coarse_channels[i] <= 16;
-    return is;
+    (void)user;
+    return size <= MOST ? aligned_alloc(alignment, (size + alignment - 1) / alignment * alignment)
+                        : NULL;
 }
 
-static void build(const ascc_architecture *a)
+static void release(void *user, void *memory, size_t size)
 {
+    (void)user;
+    (void)size;
+    free(memory);
+}
+
+static void *reallocate(void *user, void *memory, size_t old_size, size_t size, size_t alignment)
+{
+    void *moved = allocate(user, size, alignment);
+    if (moved) {
+        memcpy(moved, memory, old_size < size ? old_size : size);
+        release(user, memory, old_size);
+    }
+    return moved;
+}
+
+/* What is described begins and steps, or is refused by name. */
+static void begin(const ascc_train_config *c)
+{
+    static unsigned char bytes[MOST];
+    const ascc_context_options options = {
+        .size = sizeof options, .allocate = allocate, .reallocate = reallocate, .release = release};
+    ascc_train_context *train = NULL;
     ascc_context *context = NULL;
     ascc_model *model = NULL;
     size_t size;
     char error[256] = "";
-    unsigned char *bytes = ascc_architecture_build(a, &size, error, sizeof error);
-    fuzz_require(bytes || error[0]);
-    if (!bytes)
-        return;
+    fuzz_require(ascc_train_context_create(&options, &train) == ASCC_OK);
     fuzz_require(ascc_context_create(NULL, &context) == ASCC_OK);
-    if (ascc_model_load_memory(context, bytes, size, &model) == ASCC_OK)
-        fuzz_step_model(context, model); /* else a number fits the config, but no model */
-    (void)ascc_context_message(context, error, sizeof error);
-    fuzz_require(model || error[0]);
+    const ascc_status status =
+        ascc_train_initial_model(train, c->network, c->network_seed, bytes, sizeof bytes, &size);
+    (void)ascc_train_context_message(train, error, sizeof error);
+    fuzz_named(status, error);
+    if (status == ASCC_OK) {
+        fuzz_load(context, bytes, size, &model);
+        fuzz_step_model(context, model);
+    }
     ascc_model_destroy(&model);
     ascc_context_destroy(&context);
-    free(bytes);
+    ascc_train_context_destroy(&train);
 }
 
 /* Patterns of several stars in several folders would search the whole disk. */
@@ -77,8 +101,8 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     (void)fuzz_file("a.safetensors", "", 0); /* data that a pattern finds */
     if (ascc_train_config_read(fuzz_file("c.json", data, size), &config, error, sizeof error)) {
         check(&config);
-        if (config.described && small(&config.architecture))
-            build(&config.architecture);
+        if (config.network)
+            begin(&config);
     } else {
         fuzz_require(error[0] != '\0');
     }

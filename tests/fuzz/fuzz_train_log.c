@@ -51,7 +51,7 @@ static void resume(const char *path, uint64_t iteration)
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 {
     static const char heading[] =
-        "iteration,stage,horizon,presteps,learning_rate,loss,gradient_norm,seconds,steps,"
+        "iteration,stage,unroll,warm_up,learning_rate,loss,gradient_norm,seconds,steps,"
         "ended_early,skipped,err_n1,err_n2,rollout_last,escaped,density_error,stable\n";
     if (size < 2)
         return 0;

@@ -16,7 +16,7 @@
 typedef struct choices {
     ascc_trainer_options options;
     ascc_training_stage stage;
-    char message[256];
+    int32_t threads;
 } choices;
 
 /* An odd number now and then. */
@@ -30,16 +30,17 @@ static void read_options(fuzz_input *in, choices *c)
 {
     const uint64_t flags = fuzz_take(in, 1), counts = fuzz_take(in, 1);
     memset(c, 0, sizeof *c);
+    c->threads = 1 + (int32_t)(counts >> 2 & 1);
     c->stage = (ascc_training_stage){.end = 1000,
-                                     .horizon = 1 + (int32_t)(counts & 1),
-                                     .presteps = (int32_t)(counts >> 1 & 1),
+                                     .unroll = 1 + (int32_t)(counts & 1),
+                                     .warm_up = (int32_t)(counts >> 1 & 1),
                                      .learning_rate = odd(in, 1e-3),
                                      .learning_rate_end = odd(in, 0.0)};
     c->options = (ascc_trainer_options){.size = sizeof c->options,
                                         .seed = fuzz_take(in, 1),
-                                        .thread_count = 1 + (int32_t)(counts >> 2 & 1),
                                         .batch = 1 + (int32_t)(counts >> 3 & 1),
                                         .stage = &c->stage,
+                                        .stage_size = sizeof c->stage,
                                         .stage_count = 1,
                                         .position_gradients = flags & 1,
                                         .rotate = flags >> 1 & 1,
@@ -51,9 +52,7 @@ static void read_options(fuzz_input *in, choices *c)
                                         .memory_limit = flags & 128 ? 1 : 0,
                                         .clip = odd(in, 0.0),
                                         .truth_share = odd(in, 0.0),
-                                        .neighbor_weight = odd(in, 0.0),
-                                        .message = c->message,
-                                        .message_size = sizeof c->message};
+                                        .neighbor_weight = odd(in, 0.0)};
 }
 
 enum { FRAMES = 5, FLUID = 9, WALLS = 6 };
@@ -113,7 +112,7 @@ static void train(ascc_trainer *trainer, const choices *c)
     float *gradient = malloc(ascc_trainer_parameter_count(trainer) * sizeof *gradient + 1);
     fuzz_require(gradient != NULL);
     fuzz_named(
-        ascc_trainer_gradient(trainer, 0, 1, c->stage.presteps, c->stage.horizon, &loss, gradient),
+        ascc_trainer_gradient(trainer, 0, 1, c->stage.warm_up, c->stage.unroll, &loss, gradient),
         ascc_trainer_message(trainer));
     free(gradient);
     size_t size;
@@ -145,6 +144,20 @@ static unsigned char *network_of(const uint8_t *data, size_t size, fuzz_input *i
     return bytes;
 }
 
+/* Leaves NULL where it is refused by name. */
+static void create(const choices *c, const unsigned char *bytes, size_t size,
+                   ascc_trainer **trainer)
+{
+    const ascc_context_options options = {.size = sizeof options, .thread_count = c->threads};
+    ascc_train_context *context = NULL;
+    char message[256] = "";
+    fuzz_require(ascc_train_context_create(&options, &context) == ASCC_OK);
+    const ascc_status status = ascc_trainer_create(context, &c->options, bytes, size, trainer);
+    (void)ascc_train_context_message(context, message, sizeof message);
+    fuzz_named(status, message);
+    ascc_train_context_destroy(&context);
+}
+
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 {
     if (size < 2 || (data[0] != 'm' && data[0] != 't'))
@@ -157,7 +170,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     float position[FRAMES * FLUID * 3], wall[WALLS * 3], normal[WALLS * 3];
     unsigned char *bytes = network_of(data, size, &in, &made);
     read_options(&in, &c);
-    fuzz_named(ascc_trainer_create(&c.options, bytes, made, &trainer), c.message);
+    create(&c, bytes, made, &trainer);
     free(bytes);
     if (!trainer)
         return 0;

@@ -225,9 +225,25 @@ static void write_training(void)
         "\"time_step\":0.005,\"channels\":4,\"levels\":1,\"coarse_channels\":[4]},"
         "\"data\":{\"train\":[\"*.safetensors\",{\"path\":\"a.safetensors\",\"share\":2,\"every\":"
         "2}"
-        "],\"valid\":[\"a.safetensors\"]},\"stages\":[{\"iterations\":10,\"horizon\":2,"
-        "\"presteps\":1,\"learning_rate\":0.001,\"learning_rate_end\":1e-05}],\"output\":\"m\","
+        "],\"valid\":[\"a.safetensors\"]},\"stages\":[{\"iterations\":10,\"unroll\":2,"
+        "\"warm_up\":1,\"learning_rate\":0.001,\"learning_rate_end\":1e-05}],\"output\":\"m\","
         "\"validate\":{\"every_iterations\":5,\"frames\":2,\"starts\":1,\"rollouts\":1}}";
+    static const char described[] =
+        "{\"description\":{\"name\":\"d\",\"dimension\":2,\"time_step\":0.005,\"gravity\":[0,-9.81]"
+        ","
+        "\"particle_spacing\":0.05,\"rest_density\":1000,\"evaluate\":\"current\",\"features\":"
+        "{\"fluid\":[\"one\",\"velocity\"],\"boundary\":[\"one\"]},\"layers\":[{\"name\":\"a\","
+        "\"points\":\"fluid\",\"channels\":4,\"terms\":[{\"type\":\"convolution\",\"source\":"
+        "\"fluid\","
+        "\"outputs\":2,\"kernel\":\"k\",\"bias\":\"kb\",\"cells\":[3,2,1],\"radius\":0.1,"
+        "\"window\":"
+        "\"poly6\",\"mapping\":\"volume\"},{\"type\":\"dense\",\"source\":\"fluid\",\"column\":2,"
+        "\"weight\":\"w\"}]}],\"output\":{\"type\":\"antisymmetric\",\"source\":\"a\",\"scale\":0."
+        "01,"
+        "\"kernel\":\"o\",\"stored\":\"full\",\"cells\":[3,3,1],\"radius\":0.1,\"window\":\"peak\","
+        "\"mapping\":\"identity\",\"projection\":\"none\"}},\"data\":{\"train\":[\"a.safetensors\"]"
+        "},"
+        "\"stages\":[{\"iterations\":1,\"unroll\":1,\"learning_rate\":0.1}],\"output\":\"m\"}";
     static const char basis[] =
         "{\"network\":{\"name\":\"b\",\"dimension\":3,\"spacing\":0.05,\"time_step\":0.02,"
         "\"channels\":8,\"fine_layers\":2,\"levels\":2,\"coarse_channels\":[4,4],\"radius\":2,"
@@ -245,6 +261,7 @@ static void write_training(void)
     unsigned char numbers[64] = {0};
     write_text("train_config", "grid", grid);
     write_text("train_config", "basis", basis);
+    write_text("train_config", "described", described);
     write_text("train_log", "rows", rows);
     write_text("train_log", "headless", "\2xiteration,stage\n1,2\n");
     for (char k = 0; k < 4; k++) {
