@@ -92,7 +92,7 @@ for option in help --help version --version 'sim --help' 'info --help' 'convert 
 done
 
 # A small network as the published ones are described: an input of the fuzzer's, behind its first byte.
-tail -c +2 "$root/tests/fuzz/corpus/cconv-f" >published
+tail -c +2 "$root/tests/fuzz/corpus/model/cconv-f" >published
 run convert published -o m.safetensors
 report $? 'a published network is converted'
 holds 'and says what it became' grep -q '^m.safetensors: model small, 221 parameters$' out

@@ -300,7 +300,7 @@ report $? 'a log that cannot be written is an error'
 
 # ---- A published network ----
 
-tail -c +2 "$source/tests/fuzz/corpus/cconv-f" >published
+tail -c +2 "$source/tests/fuzz/corpus/model/cconv-f" >published
 run sim published dam-break-3d --size 5 -n 8 -o fall.safetensors
 cat >published.json <<'END'
 {"model": "published", "data": {"train": ["fall.safetensors"]}, "output": "learned.safetensors",
