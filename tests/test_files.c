@@ -33,6 +33,7 @@ static int open_all(void **state)
                                           .stage = &stage,
                                           .stage_count = 1,
                                           .batch = 1,
+                                          .whiten = -1,
                                           .message = message,
                                           .message_size = sizeof message};
     assert_int_equal(ascc_context_create(NULL, &context), ASCC_OK);
