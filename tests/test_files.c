@@ -34,7 +34,8 @@ static int open_all(void **state)
                                           .stage = &stage,
                                           .stage_size = sizeof stage,
                                           .stage_count = 1,
-                                          .batch = 1};
+                                          .batch = 1,
+                                          .whiten = -1};
     assert_int_equal(ascc_context_create(NULL, &context), ASCC_OK);
     assert_int_equal(ascc_model_load_memory(context, bytes, size, &model), ASCC_OK);
     if (ascc_train_context_create(NULL, &train) != ASCC_OK ||

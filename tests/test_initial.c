@@ -496,9 +496,9 @@ static void arguments_are_checked_and_failures_logged(void **state)
     const ascc_training_stage two[2] = {stage, {.end = 4, .unroll = 1, .learning_rate = 1.0}};
     ascc_trainer *trainer = NULL;
     ascc_trainer_options o = training();
-    o.reserved = 1;
+    o.whiten = 1;
     assert_int_equal(ascc_trainer_create(own, &o, bytes, size, &trainer), ASCC_ERROR_ARGUMENT);
-    assert_non_null(strstr(log.last, "reserved"));
+    assert_non_null(strstr(log.last, "whiten"));
     o = training();
     o.stage_size = 8;
     assert_int_equal(ascc_trainer_create(own, &o, bytes, size, &trainer), ASCC_ERROR_ARGUMENT);

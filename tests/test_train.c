@@ -703,7 +703,7 @@ static void training_lowers_the_loss(void **state)
     (void)state;
     const model_random random = everything(26, 2);
     ascc_trainer_options o = default_options();
-    ascc_training_stage stage = {.end = 1000, .unroll = 2, .learning_rate = 1e-2};
+    ascc_training_stage stage = {.end = 1000, .unroll = 2, .learning_rate = 3e-3};
     o.stage = &stage;
     motion *m = make_motion(10, 2);
     for (size_t t = 1; t < FRAMES; t++) /* it rests: weights may learn to hold it against gravity */

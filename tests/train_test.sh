@@ -107,6 +107,7 @@ wrong "stage 2: 'unroll' is 0" 's/"unroll": 2/"unroll": 0/'
 wrong "stage 1: unknown key 'rate'" 's/"learning_rate_end"/"rate"/'
 wrong "data: train: *_0009.safetensors: there is no such file" 's|data/[*]_0000|*_0009|'
 wrong "data: train: unknown key 'shared'" 's/"share"/"shared"/'
+wrong "config: 'whiten' must be true or false" 's/"batch": 2/"batch": 2, "whiten": 1/'
 wrong "'output' is missing" '/"output"/d'
 wrong "validate: unknown key 'frame'" 's/"frames"/"frame"/'
 wrong "nowhere/deep/m" 's|bad/m.saf|nowhere/deep/m.saf|'
@@ -131,6 +132,8 @@ fi
 refuses 1 'whole/m.checkpoint: is there already: --resume' train whole.json
 run train whole.json --resume
 report $? 'a run that is done is resumed in vain'
+config plain.json whole 's/"batch": 2/"batch": 2, "whiten": false/'
+refuses 1 'is of training with whitened inputs' train plain.json --resume
 mkdir -p empty
 PATH=$folder/empty run train whole.json --resume
 holds 'without gnuplot a line says so' grep -q 'no chart: gnuplot' out
@@ -273,11 +276,11 @@ config damaged.json damaged
 run train damaged.json --iterations 2
 head -c 300 damaged/m.checkpoint >cut && mv cut damaged/m.checkpoint
 refuses 1 'damaged/m.checkpoint: ' train damaged.json --resume
-# The last float of the second moments becomes NaN.
+# The last float becomes NaN.
 rm -f damaged/m.checkpoint
 run train damaged.json --iterations 2
 head -c -4 damaged/m.checkpoint >nan && printf '\000\000\300\177' >>nan && mv nan damaged/m.checkpoint
-refuses 1 "tensor 'moment2' holds a value that is not finite" train damaged.json --resume
+refuses 1 "tensor 'whitening' holds a value that is not finite" train damaged.json --resume
 
 config full.json full
 run train full.json --iterations 3

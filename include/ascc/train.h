@@ -101,9 +101,10 @@ typedef struct ascc_trainer_options {
     size_t memory_limit;        /* bytes of kept steps in all rollouts at once; what does not fit is
                                    computed a second time; 0 = 4 GiB */
     int32_t position_gradients; /* 1: also through the places of particles; 0: as constants */
-    int32_t rotate;   /* 1: turn rollouts about gravity (without gravity: about any axis) */
-    int32_t mirror;   /* 1: mirror every second rollout in a plane along gravity */
-    int32_t reserved; /* 0 */
+    int32_t rotate; /* 1: turn rollouts about gravity (without gravity: about any axis) */
+    int32_t mirror; /* 1: mirror every second rollout in a plane along gravity */
+    int32_t whiten; /* the inputs of first layers, for Adam (docs/training.md), as the sequences are
+                         at the first iteration: 0 = yes, -1 = no */
 } ascc_trainer_options;
 
 /** What an iteration did. */
@@ -111,7 +112,7 @@ typedef struct ascc_training_report {
     size_t size;          /* sizeof(ascc_training_report) */
     uint64_t iteration;   /* done in all */
     double loss;          /* mean of Eq. 3 over steps and rollouts, particle spacings */
-    double gradient_norm; /* before clipping */
+    double gradient_norm; /* before clipping, by the whitened weights */
     double learning_rate;
     int32_t unroll, warm_up;
     int32_t ended_early; /* rollouts whose steps without gradient blew up and were cut */
@@ -169,11 +170,13 @@ ASCC_API uint64_t ascc_trainer_iteration(const ascc_trainer *trainer);
 
 /**
  * Everything that the next iterations depend on besides options and sequences: weights, their average,
- * Adam's moments, the iteration. Going on from a saved state gives the bits of never having stopped.
+ * Adam's moments, the whitening that they are of, the iteration. Going on from a saved state gives the bits
+ * of never having stopped.
  * save promises and refuses what ascc_model_save does. load reads and checks everything before it changes
  * anything: numbers that are not finite, moments that cannot be, weights that no model may have, an
  * iteration beyond 2^53 are FORMAT, and the message names the tensor.
- * errors: FILE, FORMAT, MISMATCH (of another network), MEMORY; after a failed load the trainer is as it was.
+ * errors: FILE, FORMAT, MISMATCH (of another network, or of training with whitening but without here, or the
+ * other way round), MEMORY; after a failed load the trainer is as it was.
  */
 ASCC_API ascc_status ascc_trainer_save(ascc_trainer *trainer, const char *path);
 ASCC_API ascc_status ascc_trainer_load(ascc_trainer *trainer, const char *path);

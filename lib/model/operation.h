@@ -90,6 +90,9 @@ typedef struct ascc_operation {
 
     /* Adds to the tile's rows. */
     void (*forward)(const struct ascc_tile *tile, const ascc_term *term);
+    /* The columns of the tile's rows that its matrix multiplies, one after another in tile->column; returns how
+     * many: rows that have no such term have none. NULL = it never has a matrix. */
+    size_t (*columns)(const struct ascc_tile *tile, const ascc_term *term);
     /* From the gradient of a tile to those of tensors, source and places. */
     void (*backward)(const struct ascc_reverse *pass, const ascc_layer *layer,
                      const ascc_term *term, const uint32_t *list, size_t n);

@@ -78,14 +78,23 @@ ascc_neighborhood ascc_column_look(const ascc_network_run *run, const ascc_term 
     return around;
 }
 
+size_t ascc_column_gather(const ascc_tile *tile, const ascc_term *term, ascc_gather_function gather)
+{
+    const size_t stride = ascc_matrix_length(term) + ASCC_COLUMN_PADDING;
+    for (size_t r = 0; r < tile->n; r++) {
+        const ascc_neighborhood around = ascc_column_look(
+            tile->run, term, tile->list[r], tile->scratch, tile->room, tile->sequence);
+        gather(tile->run, term, &around, tile->column + r * stride);
+    }
+    return tile->n;
+}
+
 void ascc_column_forward(const ascc_tile *tile, const ascc_term *term, ascc_gather_function gather)
 {
     const ascc_network_run *run = tile->run;
     const size_t length = ascc_matrix_length(term), stride = length + ASCC_COLUMN_PADDING;
+    (void)ascc_column_gather(tile, term, gather);
     for (size_t r = 0; r < tile->n; r++) {
-        const ascc_neighborhood around =
-            ascc_column_look(run, term, tile->list[r], tile->scratch, tile->room, tile->sequence);
-        gather(run, term, &around, tile->column + r * stride);
         float *to = tile->sum + r * tile->width + term->column;
         ascc_matrix_add_bias(run, term, to);
         for (int32_t c = 0; !term->tensor[ASCC_TENSOR_WEIGHT] && c < term->outputs; c++)

@@ -46,7 +46,9 @@ ascc_neighborhood ascc_column_look(const ascc_network_run *run, const ascc_term 
                                    float *scratch, size_t room, const uint32_t *sequence);
 void ascc_column_scratch(const ascc_plan *plan, const ascc_term *term, ascc_scratch_sizes *sizes);
 
-/* `forward` and `backward` of an operation that gathers like this. */
+/* `columns`, `forward` and `backward` of an operation that gathers like this. */
+size_t ascc_column_gather(const ascc_tile *tile, const ascc_term *term,
+                          ascc_gather_function gather);
 void ascc_column_forward(const ascc_tile *tile, const ascc_term *term, ascc_gather_function gather);
 
 /* The way back of one row: its column's gradient to the features of the neighbours ... */

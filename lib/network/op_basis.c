@@ -89,6 +89,11 @@ static void gather(const ascc_network_run *run, const ascc_term *term,
                           around->count, around->feature, ascc_padded(term->inputs), column);
 }
 
+static size_t columns(const ascc_tile *tile, const ascc_term *term)
+{
+    return ascc_column_gather(tile, term, gather);
+}
+
 static void forward(const ascc_tile *tile, const ascc_term *term)
 {
     ascc_column_forward(tile, term, gather);
@@ -204,5 +209,6 @@ const ascc_operation ascc_op_basis = {.name = "convolution in a basis",
                                       .cost = cost,
                                       .scratch = ascc_column_scratch,
                                       .reads_features = ascc_convolution_reads_features,
+                                      .columns = columns,
                                       .forward = forward,
                                       .backward = backward};

@@ -44,6 +44,20 @@ static void scratch(const ascc_plan *plan, const ascc_term *term, ascc_scratch_s
     sizes->column = ascc_max_size(sizes->column, ascc_padded(term->inputs));
 }
 
+static size_t columns(const ascc_tile *tile, const ascc_term *term)
+{
+    const ascc_network_run *run = tile->run;
+    const int32_t set = ascc_network_set(run->network, term->source);
+    const size_t a = ascc_padded(term->inputs);
+    const float *source = ascc_term_source(run, term);
+    size_t count = 0;
+    for (size_t r = 0, j; r < tile->n; r++)
+        if (ascc_network_shared_row(run->hierarchy, tile->layer->set, set, tile->list[r], &j))
+            memcpy(tile->column + count++ * (a + ASCC_COLUMN_PADDING), source + j * a,
+                   a * sizeof(float));
+    return count;
+}
+
 static void forward(const ascc_tile *tile, const ascc_term *term)
 {
     const ascc_network_run *run = tile->run;
@@ -94,5 +108,6 @@ const ascc_operation ascc_op_dense = {.name = "dense",
                                       .transpose = ascc_matrix_transpose,
                                       .cost = cost,
                                       .scratch = scratch,
+                                      .columns = columns,
                                       .forward = forward,
                                       .backward = backward};

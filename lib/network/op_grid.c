@@ -77,6 +77,11 @@ static void gather(const ascc_network_run *run, const ascc_term *term,
                                 term->filter.cells, column);
 }
 
+static size_t columns(const ascc_tile *tile, const ascc_term *term)
+{
+    return ascc_column_gather(tile, term, gather);
+}
+
 static void forward(const ascc_tile *tile, const ascc_term *term)
 {
     ascc_column_forward(tile, term, gather);
@@ -154,5 +159,6 @@ const ascc_operation ascc_op_grid = {.name = "convolution on a grid",
                                      .cost = cost,
                                      .scratch = ascc_column_scratch,
                                      .reads_features = ascc_convolution_reads_features,
+                                     .columns = columns,
                                      .forward = forward,
                                      .backward = backward};

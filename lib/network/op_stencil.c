@@ -202,14 +202,21 @@ static void gather_row(const ascc_network_run *run, const ascc_term *term, size_
     }
 }
 
+static size_t columns(const ascc_tile *tile, const ascc_term *term)
+{
+    const size_t stride = ascc_matrix_length(term) + ASCC_COLUMN_PADDING;
+    for (size_t r = 0; r < tile->n; r++)
+        gather_row(tile->run, term, tile->list[r], tile->column + r * stride);
+    return tile->n;
+}
+
 static void forward(const ascc_tile *tile, const ascc_term *term)
 {
     const ascc_network_run *run = tile->run;
     const size_t length = ascc_matrix_length(term), stride = length + ASCC_COLUMN_PADDING;
-    for (size_t r = 0; r < tile->n; r++) {
-        gather_row(run, term, tile->list[r], tile->column + r * stride);
+    (void)columns(tile, term);
+    for (size_t r = 0; r < tile->n; r++)
         ascc_matrix_add_bias(run, term, tile->sum + r * tile->width + term->column);
-    }
     run->tools->kernels->multiply(tile->column, stride, tile->n, length,
                                   ascc_term_packed(run, term), ascc_padded(term->outputs),
                                   tile->sum + term->column, tile->width);
@@ -298,5 +305,6 @@ const ascc_operation ascc_op_stencil = {.name = "stencil",
                                         .transpose = ascc_matrix_transpose,
                                         .cost = cost,
                                         .scratch = scratch,
+                                        .columns = columns,
                                         .forward = forward,
                                         .backward = backward};

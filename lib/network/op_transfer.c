@@ -111,6 +111,11 @@ static void gather(const ascc_network_run *run, const ascc_term *term,
                                       around->feature, ascc_padded(term->inputs), column);
 }
 
+static size_t columns(const ascc_tile *tile, const ascc_term *term)
+{
+    return ascc_column_gather(tile, term, gather);
+}
+
 static void forward(const ascc_tile *tile, const ascc_term *term)
 {
     ascc_column_forward(tile, term, gather);
@@ -189,5 +194,6 @@ const ascc_operation ascc_op_transfer = {.name = "transfer",
                                          .transpose = ascc_matrix_transpose,
                                          .cost = cost,
                                          .scratch = ascc_column_scratch,
+                                         .columns = columns,
                                          .forward = forward,
                                          .backward = backward};

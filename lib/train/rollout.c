@@ -287,20 +287,46 @@ static void go_back(rollout *r, ascc_rollout_result *result, size_t kept_from, f
         ascc_packed_fold(&model->packed, &model->plan, model->weights, packed, gradient);
 }
 
+/* Everything but the particles' first state. */
+static ascc_status open_rollout(rollout *r, ascc_rollout_worker *worker,
+                                const ascc_rollout_task *task)
+{
+    const ascc_plan *plan = &worker->model->plan;
+    const size_t d = (size_t)plan->dimension;
+    *r = (rollout){.worker = worker, .task = task, .plan = plan};
+    r->numbers = task->sequence->fluid_count * d;
+    r->walls = task->sequence->boundary_count * d;
+    r->motion = (ascc_motion){.time_step = worker->step->time_step, .advection = plan->advection};
+    for (size_t c = 0; c < d; c++)
+        for (size_t k = 0; k < d; k++)
+            r->motion.gravity[c] += task->transform.turn[c][k] * task->sequence->gravity[k];
+    return take_memory(r) ? open_particles(r) : ASCC_ERROR_MEMORY;
+}
+
+ascc_status ascc_rollout_look(ascc_rollout_worker *worker, const ascc_rollout_task *task,
+                              ascc_engine engine)
+{
+    rollout r;
+    ascc_random random = task->random;
+    const ascc_engine own = worker->step->engine;
+    ascc_status status = open_rollout(&r, worker, task);
+    if (status == ASCC_OK) {
+        start_at(&r, task->frame, &random);
+        worker->step->engine = engine;
+        status = step_into(&r, 0);
+        worker->step->engine = own;
+    }
+    ascc_particles_destroy(&r.particles);
+    return status;
+}
+
 ascc_rollout_result ascc_rollout_run(ascc_rollout_worker *worker, const ascc_transposed *transposed,
                                      const ascc_rollout_task *task, float *packed, float *gradient)
 {
-    ascc_rollout_result result = {.status = ASCC_OK};
-    const ascc_plan *plan = &worker->model->plan;
-    const size_t d = (size_t)plan->dimension, unroll = (size_t)task->unroll;
-    rollout r = {.worker = worker, .transposed = transposed, .task = task, .plan = plan};
-    r.numbers = task->sequence->fluid_count * d;
-    r.walls = task->sequence->boundary_count * d;
-    r.motion = (ascc_motion){.time_step = worker->step->time_step, .advection = plan->advection};
-    for (size_t c = 0; c < d; c++)
-        for (size_t k = 0; k < d; k++)
-            r.motion.gravity[c] += task->transform.turn[c][k] * task->sequence->gravity[k];
-    result.status = take_memory(&r) ? open_particles(&r) : ASCC_ERROR_MEMORY;
+    const size_t unroll = (size_t)task->unroll;
+    rollout r;
+    ascc_rollout_result result = {.status = open_rollout(&r, worker, task)};
+    r.transposed = transposed;
     if (result.status == ASCC_OK) {
         size_t kept_from = 0;
         prepare(&r, &result);

@@ -53,6 +53,11 @@ void ascc_rollout_worker_close(ascc_rollout_worker *worker);
 ascc_rollout_result ascc_rollout_run(ascc_rollout_worker *worker, const ascc_transposed *transposed,
                                      const ascc_rollout_task *task, float *packed, float *gradient);
 
+/* One step from the true state that the task begins with, by this engine: what it saw is in worker->state[0]
+ * until the worker is used again. errors: as of a step. */
+ascc_status ascc_rollout_look(ascc_rollout_worker *worker, const ascc_rollout_task *task,
+                              ascc_engine engine);
+
 /* Loss of one state against the truth and its gradient (NULL = not wanted), [fluid][dimension], times
  * `share`. errors: MEMORY, RANGE. */
 ascc_status ascc_loss_of(const ascc_rollout_task *task, const ascc_plan *plan,

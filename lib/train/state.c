@@ -13,6 +13,7 @@
 /* The arrays of one block, in its order. */
 enum { WEIGHTS, AVERAGE, MOMENT1, MOMENT2, ARRAYS };
 static const char *const names[] = {"weights", "average", "moment1", "moment2"};
+static const char WHITENING[] = "whitening"; /* what the moments are seen through, if anything */
 
 #define MAX_ITERATION ((uint64_t)1 << 53)
 
@@ -56,6 +57,7 @@ ascc_status ascc_trainer_save(ascc_trainer *t, const char *path)
         return FAIL(ASCC_ERROR_ARGUMENT, "trainer: a NULL argument");
     char header[1024];
     const size_t bytes = t->parameter_count * sizeof(float);
+    const size_t white = t->whitening.ready ? t->whitening.number_count * sizeof(float) : 0;
     int length = snprintf(header, sizeof header,
                           "{\"__metadata__\":{\"format\":\"ascc.trainer\",\"version\":\"1\","
                           "\"iteration\":\"%" PRIu64 "\",\"network\":\"%016" PRIx64 "\"}",
@@ -64,14 +66,21 @@ ascc_status ascc_trainer_save(ascc_trainer *t, const char *path)
         length += snprintf(header + length, sizeof header - (size_t)length,
                            ",\"%s\":{\"dtype\":\"F32\",\"shape\":[%zu],\"data_offsets\":[%zu,%zu]}",
                            names[i], t->parameter_count, i * bytes, (i + 1) * bytes);
+    if (white)
+        length +=
+            snprintf(header + length, sizeof header - (size_t)length,
+                     ",\"%s\":{\"dtype\":\"F32\",\"shape\":[%zu],\"data_offsets\":[%zu,%zu]}",
+                     WHITENING, t->whitening.number_count, ARRAYS * bytes, ARRAYS * bytes + white);
     length += snprintf(header + length, sizeof header - (size_t)length, "}");
     while (length % 8)
         header[length++] = ' ';
     unsigned char size[8];
     for (int i = 0; i < 8; i++)
         size[i] = (unsigned char)((uint64_t)length >> (8 * i));
-    const ascc_bytes piece[] = {
-        {size, sizeof size}, {header, (size_t)length}, {t->weights, ARRAYS * bytes}};
+    const ascc_bytes piece[] = {{size, sizeof size},
+                                {header, (size_t)length},
+                                {t->weights, ARRAYS * bytes},
+                                {t->whitening.number, white}};
     const ascc_status status =
         ascc_write_file(path, piece, sizeof piece / sizeof *piece, &t->message);
     return status == ASCC_OK ? status : FAIL(status, "%s", t->message.text);
@@ -110,13 +119,13 @@ static ascc_status check_metadata(ascc_trainer *t, const char *path, ascc_safete
     return ASCC_OK;
 }
 
-/* values[parameter_count] = the array of that name. */
+/* values[count] = the array of that name. */
 static ascc_status read_array(ascc_trainer *t, const char *path, const ascc_safetensors *file,
-                              const char *name, float *values)
+                              const char *name, size_t count, float *values)
 {
     ascc_message why = {""};
     const int32_t k = ascc_safetensors_find(file, name);
-    if (k < 0 || file->tensor[k].count != t->parameter_count)
+    if (k < 0 || file->tensor[k].count != count)
         return FAIL(ASCC_ERROR_FORMAT, "'%s': tensor '%s' is missing or of another size", path,
                     name);
     if (strcmp(file->tensor[k].type, "F32") != 0)
@@ -154,7 +163,7 @@ static ascc_status read_arrays(ascc_trainer *t, const char *path, const ascc_saf
     const size_t n = t->parameter_count;
     ascc_status status = ASCC_OK;
     for (size_t i = 0; i < ARRAYS && status == ASCC_OK; i++)
-        status = read_array(t, path, file, names[i], state + i * n);
+        status = read_array(t, path, file, names[i], n, state + i * n);
     for (size_t i = 0; i < n && status == ASCC_OK; i++)
         if (state[MOMENT2 * n + i] < 0.0f)
             status = FAIL(ASCC_ERROR_FORMAT, "'%s': tensor '%s': value %zu is negative", path,
@@ -164,6 +173,20 @@ static ascc_status read_arrays(ascc_trainer *t, const char *path, const ascc_saf
     return status;
 }
 
+/* Moments mean something only through the whitening that they were made with. Before the first iteration there are
+ * none, and whitening is measured then. */
+static ascc_status read_whitening(ascc_trainer *t, const char *path, const ascc_safetensors *file,
+                                  uint64_t iteration, float *number, bool *there)
+{
+    const bool wanted = t->whitening.term_count > 0;
+    *there = ascc_safetensors_find(file, WHITENING) >= 0;
+    if (*there != wanted && (*there || iteration > 0))
+        return FAIL(ASCC_ERROR_MISMATCH, "'%s' is of training %s whitened inputs", path,
+                    *there ? "with" : "without");
+    return *there ? read_array(t, path, file, WHITENING, t->whitening.number_count, number)
+                  : ASCC_OK;
+}
+
 /* Everything is read and checked before anything changes. */
 static ascc_status read_state(ascc_trainer *t, const char *path, ascc_safetensors *file)
 {
@@ -171,19 +194,25 @@ static ascc_status read_state(ascc_trainer *t, const char *path, ascc_safetensor
     ascc_status status = check_metadata(t, path, file, &iteration);
     if (status != ASCC_OK)
         return status;
-    const size_t count = ARRAYS * t->parameter_count;
-    float *state = ascc_allocate(&t->allocator, count, sizeof *state);
+    const size_t own = ARRAYS * t->parameter_count, white = t->whitening.number_count;
+    bool whitened = false;
+    float *state = ascc_allocate(&t->allocator, own + white, sizeof *state);
     if (!state)
         return FAIL(ASCC_ERROR_MEMORY, "no memory to read '%s'", path);
     status = read_arrays(t, path, file, state);
+    if (status == ASCC_OK)
+        status = read_whitening(t, path, file, iteration, state + own, &whitened);
     if (status == ASCC_OK) {
-        memcpy(t->weights, state, count * sizeof *state);
+        memcpy(t->weights, state, own * sizeof *state);
+        if (whitened)
+            memcpy(t->whitening.number, state + own, white * sizeof *state);
+        t->whitening.ready = whitened;
         t->iteration = iteration;
         t->changed = false;
         t->failed_iterations = t->zero_gradient_count = 0;
         ascc_trainer_apply(t);
     }
-    ascc_release(&t->allocator, state, count, sizeof *state);
+    ascc_release(&t->allocator, state, own + white, sizeof *state);
     return status;
 }
 
@@ -197,7 +226,7 @@ ascc_status ascc_trainer_load(ascc_trainer *t, const char *path)
     FILE *stream = fopen(path, "rb");
     if (!stream)
         return FAIL(ASCC_ERROR_FILE, "cannot open '%s': %s", path, strerror(errno));
-    const size_t most = 16 * t->parameter_count + 65536;
+    const size_t most = 16 * t->parameter_count + 4 * t->whitening.number_count + 65536;
     unsigned char *bytes = ascc_allocate(&t->allocator, most, 1);
     const size_t size = bytes ? fread(bytes, 1, most, stream) : 0;
     const bool broken = ferror(stream) != 0;

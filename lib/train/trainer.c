@@ -89,8 +89,8 @@ static ascc_status read_options(ascc_trainer *t, const ascc_trainer_options *giv
         return REFUSE(ASCC_ERROR_ARGUMENT,
                       "options: beta1, beta2 and average must be below 1, truth_share at most 1, "
                       "batch within 0 and 65536");
-    if (o->reserved)
-        return REFUSE(ASCC_ERROR_ARGUMENT, "options: reserved is not 0");
+    if (o->whiten < -1 || o->whiten > 0)
+        return REFUSE(ASCC_ERROR_ARGUMENT, "options: whiten is 0 or -1");
     o->batch = o->batch ? o->batch : 8;
     o->beta1 = o->beta1 > 0.0 ? o->beta1 : 0.9;
     o->beta2 = o->beta2 > 0.0 ? o->beta2 : 0.999;
@@ -156,12 +156,12 @@ static ascc_status take_arrays(ascc_trainer *t)
     t->packed = take(t, threads * packed, sizeof *t->packed);
     t->gradients = take(t, batch * t->model->weight_count, sizeof *t->gradients);
     t->gradient = take(t, t->parameter_count, sizeof *t->gradient);
+    t->step = take(t, t->parameter_count, sizeof *t->step);
     t->task = take(t, batch, sizeof *t->task);
     t->result = take(t, batch, sizeof *t->result);
-    t->drawn = take(t, batch, sizeof *t->drawn);
     t->weights = take(t, 4 * t->parameter_count, sizeof *t->weights);
     t->before = take(t, 4 * t->parameter_count, sizeof *t->before);
-    if (!t->packed || !t->gradients || !t->gradient || !t->task || !t->result || !t->drawn ||
+    if (!t->packed || !t->gradients || !t->gradient || !t->step || !t->task || !t->result ||
         !t->weights || !t->before)
         return ASCC_ERROR_MEMORY;
     t->average = t->weights + t->parameter_count;
@@ -171,7 +171,9 @@ static ascc_status take_arrays(ascc_trainer *t)
         memcpy(t->weights + t->tensor[i].first, t->model->weights + t->tensor[i].offset,
                t->tensor[i].count * sizeof *t->weights);
     memcpy(t->average, t->weights, t->parameter_count * sizeof *t->average);
-    return ASCC_OK;
+    return t->options.whiten < 0 ? ASCC_OK
+                                 : ascc_whitening_create(&t->whitening, &t->allocator, t->model,
+                                                         t->tensor, t->tensor_count);
 }
 
 static ascc_status open_model(ascc_trainer *t, const void *model, size_t size)
@@ -274,9 +276,10 @@ void ascc_trainer_destroy(ascc_trainer **trainer)
     give(t, t->packed, threads * packed, sizeof *t->packed);
     give(t, t->gradients, t->model ? batch * t->model->weight_count : 0, sizeof *t->gradients);
     give(t, t->gradient, t->parameter_count, sizeof *t->gradient);
+    give(t, t->step, t->parameter_count, sizeof *t->step);
+    ascc_whitening_destroy(&t->whitening, &t->allocator);
     give(t, t->task, batch, sizeof *t->task);
     give(t, t->result, batch, sizeof *t->result);
-    give(t, t->drawn, batch, sizeof *t->drawn);
     give(t, t->weights, 4 * t->parameter_count, sizeof *t->weights);
     give(t, t->before, 4 * t->parameter_count, sizeof *t->before);
     give(t, t->tensor, t->tensor_count, sizeof *t->tensor);
@@ -483,9 +486,9 @@ static size_t starts_of(const ascc_kept_sequence *s, const ascc_training_stage *
     return s->frame_count > steps + 1 ? s->frame_count - 1 - steps : 0;
 }
 
-static ascc_status draw_task(ascc_trainer *t, const ascc_training_stage *stage, size_t b)
+static ascc_status draw_task(ascc_trainer *t, const ascc_training_stage *stage, ascc_random random,
+                             ascc_rollout_task *task)
 {
-    ascc_random random = ascc_random_open(t->options.seed, t->iteration, b);
     const double share = t->options.truth_share, drawn = ascc_random_uniform(&random);
     const double warm_up =
         drawn < share ? 0.0 : (drawn - share) / (1.0 - share) * (stage->warm_up + 1.0);
@@ -505,8 +508,6 @@ static ascc_status draw_task(ascc_trainer *t, const ascc_training_stage *stage, 
             break;
         at -= t->sequence[i].share;
     }
-    t->drawn[b] = chosen;
-    ascc_rollout_task *task = &t->task[b];
     *task = make_task(t, chosen);
     task->unroll = stage->unroll;
     task->warm_up = (int32_t)warm_up;
@@ -523,6 +524,21 @@ static ascc_status draw_task(ascc_trainer *t, const ascc_training_stage *stage, 
     return ASCC_OK;
 }
 
+/* True states as rollouts begin with, drawn apart from all iterations'. */
+static ascc_status measure_whitening(ascc_trainer *t)
+{
+    const ascc_training_stage stage = {.unroll = 1};
+    ascc_rollout_task task[ASCC_WHITENING_FRAMES];
+    ascc_status status = ASCC_OK;
+    for (size_t i = 0; i < ASCC_WHITENING_FRAMES && status == ASCC_OK; i++)
+        status = draw_task(t, &stage, ascc_random_open(t->options.seed, UINT64_MAX, i), &task[i]);
+    if (status == ASCC_OK)
+        status = ascc_whitening_measure(&t->whitening, &t->worker[0], task, ASCC_WHITENING_FRAMES);
+    if (status == ASCC_ERROR_MEMORY)
+        FAIL(status, "no memory to whiten the inputs of first layers");
+    return status;
+}
+
 static void run_tasks(void *data, size_t begin, size_t end, int32_t slot)
 {
     ascc_trainer *t = data;
@@ -534,25 +550,33 @@ static void run_tasks(void *data, size_t begin, size_t end, int32_t slot)
                              t->packed + (size_t)slot * packed, t->gradients + b * weights);
 }
 
-/* One step of Adam on the clipped gradient; damping stays without negative numbers. */
+/* The step of Adam on the clipped gradient. */
 static void adam(ascc_trainer *t, double rate, double norm)
 {
     const ascc_trainer_options *o = &t->options;
     const double n = (double)t->iteration + 1.0;
     const double scale = norm > o->clip ? o->clip / norm : 1.0;
     const double correct1 = 1.0 - pow(o->beta1, n), correct2 = 1.0 - pow(o->beta2, n);
-    const double keep = fmin(o->average, n / (n + 10.0));
+    for (size_t k = 0; k < t->parameter_count; k++) {
+        const double g = scale * (double)t->gradient[k];
+        const double m = o->beta1 * (double)t->moment1[k] + (1.0 - o->beta1) * g;
+        const double v = o->beta2 * (double)t->moment2[k] + (1.0 - o->beta2) * g * g;
+        t->step[k] = rate * (m / correct1) / (sqrt(v / correct2) + o->epsilon);
+        t->moment1[k] = (float)m;
+        t->moment2[k] = (float)v;
+    }
+}
+
+/* Moves the weights and their average by the step; damping stays without negative numbers. */
+static void move(ascc_trainer *t)
+{
+    const double n = (double)t->iteration + 1.0;
+    const double keep = fmin(t->options.average, n / (n + 10.0));
     for (size_t i = 0; i < t->tensor_count; i++)
         for (size_t k = t->tensor[i].first; k < t->tensor[i].first + t->tensor[i].count; k++) {
-            const double g = scale * (double)t->gradient[k];
-            const double m = o->beta1 * (double)t->moment1[k] + (1.0 - o->beta1) * g;
-            const double v = o->beta2 * (double)t->moment2[k] + (1.0 - o->beta2) * g * g;
-            const double step = rate * (m / correct1) / (sqrt(v / correct2) + o->epsilon);
-            double w = (double)t->weights[k] - step;
+            double w = (double)t->weights[k] - t->step[k];
             if (t->tensor[i].damps && w < 0.0)
                 w = 0.0;
-            t->moment1[k] = (float)m;
-            t->moment2[k] = (float)v;
             t->weights[k] = (float)w;
             t->average[k] = (float)(keep * (double)t->average[k] + (1.0 - keep) * w);
         }
@@ -589,6 +613,7 @@ static ascc_status sum_up(ascc_trainer *t, ascc_training_report *report)
         if (!t->result[b].skipped)
             add_gradient(t, t->gradients + (size_t)b * t->model->weight_count,
                          1.0f / (float)counted, t->gradient);
+    ascc_whitening_gradient(&t->whitening, t->gradient);
     report->loss /= counted ? counted : 1;
     for (size_t k = 0; k < t->parameter_count; k++)
         square += (double)t->gradient[k] * (double)t->gradient[k];
@@ -608,6 +633,8 @@ static void learn(ascc_trainer *t, const ascc_training_report *report)
     t->changed = true;
     t->failed_iterations = 0;
     adam(t, report->learning_rate, report->gradient_norm);
+    ascc_whitening_step(&t->whitening, t->step);
+    move(t);
     ascc_trainer_apply(t);
 }
 
@@ -665,7 +692,10 @@ ascc_status ascc_trainer_iterate(ascc_trainer *t, ascc_training_report *report)
     own.warm_up = stage->warm_up;
     ascc_status status = ASCC_OK;
     for (int32_t b = 0; b < t->batch && status == ASCC_OK; b++)
-        status = draw_task(t, stage, (size_t)b);
+        status = draw_task(t, stage, ascc_random_open(t->options.seed, t->iteration, (uint64_t)b),
+                           &t->task[b]);
+    if (status == ASCC_OK && t->whitening.term_count && !t->whitening.ready)
+        status = measure_whitening(t);
     if (status != ASCC_OK)
         return status;
     memset(t->gradients, 0, (size_t)t->batch * t->model->weight_count * sizeof *t->gradients);

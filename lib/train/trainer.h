@@ -8,15 +8,9 @@
 #include "model/operation.h"
 #include "rollout.h"
 #include "train_context.h"
+#include "whitening.h"
 
 #define ASCC_TRAINER_MAGIC 0x54435341u /* "ASCT" */
-
-/* Where a tensor of the file lies among the model's weights. */
-typedef struct ascc_trained_tensor {
-    size_t first, count; /* parameters */
-    size_t offset;       /* in the model's weights */
-    bool damps;          /* must not become negative */
-} ascc_trained_tensor;
 
 struct ascc_trainer {
     uint32_t magic;
@@ -40,9 +34,10 @@ struct ascc_trainer {
     float *packed;               /* [threads][packed weights] */
     float *gradients;            /* [batch][model weights] */
     float *gradient;             /* [parameters] */
+    double *step;                /* [parameters] of Adam */
+    ascc_whitening whitening;    /* of no terms where it is not wanted */
     ascc_rollout_task *task;     /* [batch] */
     ascc_rollout_result *result; /* [batch] */
-    size_t *drawn;               /* [batch] sequence numbers */
 
     uint64_t iteration;
     /* [parameters] each, one block: */
