@@ -85,6 +85,7 @@ typedef struct model_random {
     double contact; /* with walls, spacings; 0 = none */
     int lattice; /* 1: with moments, levels 3, motion 3: a trunk of stencils on lattices where fluid is */
     int moments; /* bumps of a first layer of pair moments, walls with one more; fluid_only, motion; 0 = none */
+    const char *relaxation; /* JSON object; NULL = none */
     int direction;  /* 1: the last layer's pairs act along their present line; bumps, fluid_only */
 } model_random;
 
