@@ -201,6 +201,7 @@ static const recipe recipes[] = {
     {"pairs on a grid", 20, 800, pairs_grid, NULL},
     {"pairs in a basis", 32, 900, pairs_basis, NULL},
     {"plain output", 8, 1000, plain, NULL},
+    {"no output", 0, 0, NULL, NULL}, /* tests/test_relaxation.c */
     {"scale", 4, 1100, scale, add_scaled},
 };
 #define RECIPES (sizeof recipes / sizeof *recipes)
