@@ -798,6 +798,144 @@ static void an_impulse_that_does_not_fit_is_told_on_every_cpu(void **state)
             }
 }
 
+/* ---- Relaxation ---- */
+
+static void the_spline_equals_doubles_and_has_the_same_bits_on_every_cpu(void **state)
+{
+    (void)state;
+    ascc_kernels table[16];
+    const int count = tables(table);
+    float volumes[50];
+    uint32_t neighbor[80];
+    for (size_t i = 0; i < 50; i++)
+        volumes[i] = 0.5f + 0.4f * uniform();
+    for (size_t k = 0; k < 70; k++) {
+        float *first[4] = {NULL}, first_sum[8] = {0};
+        for (size_t i = 0; i < k; i++)
+            neighbor[i] = next() % 50;
+        const uint64_t again = seed;
+        for (int t = 0; t < count; t++) {
+            float *array[4], sum[8];
+            const size_t room = (k + 7) / 8 * 8;
+            seed = again;
+            for (int c = 0; c < 4; c++)
+                array[c] = guarded(room);
+            double expected[5] = {0}, size[5] = {0};
+            for (size_t i = 0; i < k; i++) {
+                float u[3] = {uniform(), uniform(), uniform()};
+                const float q = i % 9 ? fabsf(uniform()) * 1.2f : 0.0f;
+                const float n = sqrtf(u[0] * u[0] + u[1] * u[1] + u[2] * u[2]);
+                const double far = fmax(1.0 - (double)q, 0.0), near = fmax(0.5 - (double)q, 0.0);
+                const double volume = k % 2 ? 0.25 : (double)volumes[neighbor[i]];
+                const double slope = volume * 6.0 * (far * far - 4.0 * near * near);
+                double term[5] = {volume * 2.0 * (far * far * far - 4.0 * near * near * near)};
+                for (int c = 0; c < 3; c++) {
+                    array[c][i] = q > 0.0f ? u[c] / n : 0.0f;
+                    term[1 + c] = slope * (double)array[c][i];
+                    term[4] += term[1 + c] * term[1 + c];
+                }
+                array[3][i] = q;
+                for (int c = 0; c < 5; c++) {
+                    expected[c] += term[c];
+                    size[c] += fabs(term[c]) + volume;
+                }
+            }
+            const ascc_pairs pairs = {
+                .x = array[0], .y = array[1], .z = array[2], .distance = array[3]};
+            table[t].spline(&pairs, neighbor, k, 0.25f, k % 2 ? NULL : volumes, sum);
+            for (int c = 0; c < 5; c++) /* a few roundings of each term, ten of each sum */
+                assert_true(fabs((double)sum[c] - expected[c]) <= 40.0 * 0x1p-24 * size[c]);
+            for (int c = 5; c < 8; c++)
+                assert_true(sum[c] == 0.0f);
+            for (int c = 0; c < 4; c++) {
+                check_guard(array[c], room);
+                for (size_t i = k; i < room; i++)
+                    assert_true(array[c][i] == 0.0f);
+                if (t > 0)
+                    check_same_bits(first[c], array[c], room, "spline");
+            }
+            if (t > 0)
+                check_same_bits(first_sum, sum, 8, "sums of the spline");
+            else
+                memcpy(first_sum, sum, sizeof sum);
+            for (int c = 0; c < 4; c++) {
+                if (t == 0)
+                    first[c] = array[c];
+                else
+                    free(array[c]);
+            }
+        }
+        for (int c = 0; c < 4; c++)
+            free(first[c]);
+    }
+}
+
+enum { SWEPT = 60, SWEPT_PAIRS = 3000 };
+
+static void sweeps_equal_doubles_and_have_the_same_bits_on_every_cpu(void **state)
+{
+    (void)state;
+    ascc_kernels table[16];
+    const int count = tables(table);
+    static float g[3][SWEPT_PAIRS], weight[SWEPT_PAIRS], pressure[SWEPT], numbers[3][SWEPT];
+    static uint32_t neighbor[SWEPT_PAIRS];
+    float *const own[3] = {numbers[0], numbers[1], numbers[2]};
+    size_t start[SWEPT], end[SWEPT], at = 0;
+    for (size_t i = 0; i < SWEPT; i++) {
+        start[i] = at;
+        const size_t pairs = next() % 45;
+        for (size_t k = 0; k < (pairs + 7) / 8 * 8; k++, at++) {
+            neighbor[at] = k < pairs ? next() % SWEPT : (uint32_t)i;
+            weight[at] = 1.0f + uniform();
+            for (int c = 0; c < 3; c++)
+                g[c][at] = k < pairs ? uniform() : 0.0f;
+        }
+        end[i] = at;
+        pressure[i] = fabsf(uniform());
+        for (int c = 0; c < 3; c++)
+            numbers[c][i] = uniform();
+    }
+    for (int weighted = 0; weighted < 2; weighted++) {
+        static float first[4][SWEPT];
+        const ascc_gradients pairs = {.start = start,
+                                      .end = end,
+                                      .neighbor = neighbor,
+                                      .g = {g[0], g[1], g[2]},
+                                      .weight = weighted ? weight : NULL};
+        for (int t = 0; t < count; t++) {
+            static float move[3][SWEPT], change[SWEPT];
+            float *const to[3] = {move[0], move[1], move[2]};
+            table[t].push(&pairs, 0, 25, pressure, own, to);
+            table[t].push(&pairs, 25, SWEPT, pressure, own, to);
+            table[t].divergence(&pairs, 0, 31, own, to, change);
+            table[t].divergence(&pairs, 31, SWEPT, own, to, change);
+            for (size_t i = 0; i < SWEPT; i++) {
+                double sum = 0.0, size = 1.0;
+                for (int c = 0; c < 3; c++) {
+                    double moved = -(double)pressure[i] * (double)own[c][i], most = 1.0;
+                    sum += (double)own[c][i] * (double)move[c][i];
+                    for (size_t k = start[i]; k < end[i]; k++) {
+                        const double share = (weighted ? (double)weight[k] : 1.0) *
+                                             (double)g[c][k] * (double)pressure[neighbor[k]];
+                        moved -= share;
+                        most += fabs(share);
+                        sum -= (double)g[c][k] * (double)move[c][neighbor[k]];
+                        size += fabs((double)g[c][k] * (double)move[c][neighbor[k]]);
+                    }
+                    assert_true(fabs((double)move[c][i] - moved) <= 16.0 * 0x1p-24 * most);
+                }
+                assert_true(fabs((double)change[i] - sum) <= 24.0 * 0x1p-24 * size);
+            }
+            for (int c = 0; c < 4; c++) {
+                const float *got = c < 3 ? move[c] : change;
+                if (t == 0)
+                    memcpy(first[c], got, sizeof first[c]);
+                check_same_bits(first[c], got, SWEPT, "sweeps");
+            }
+        }
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -816,6 +954,8 @@ int main(void)
         cmocka_unit_test(pair_terms_equal_doubles_and_have_the_same_bits_on_every_cpu),
         cmocka_unit_test(pair_impulses_are_the_nearest_integers_on_every_cpu),
         cmocka_unit_test(an_impulse_that_does_not_fit_is_told_on_every_cpu),
+        cmocka_unit_test(the_spline_equals_doubles_and_has_the_same_bits_on_every_cpu),
+        cmocka_unit_test(sweeps_equal_doubles_and_have_the_same_bits_on_every_cpu),
     };
     return cmocka_run_group_tests_name("kernels", tests, NULL, NULL);
 }

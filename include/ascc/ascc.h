@@ -518,6 +518,11 @@ typedef struct ascc_stage_time {
 } ascc_stage_time;
 #define ASCC_MAX_STAGES 24
 
+/** Density over rest density less 1, where it is above 0: over all fluid particles. */
+typedef struct ascc_compression {
+    double mean, largest;
+} ascc_compression;
+
 /** What ascc_step_get_statistics tells of the last ascc_step_run. */
 typedef struct ascc_step_statistics {
     size_t size;          /* sizeof(ascc_step_statistics) */
@@ -528,7 +533,7 @@ typedef struct ascc_step_statistics {
     double seconds_total; /* wall clock, of the run */
     /* By stage, in order: "forces" (and advection), "sight" (features, sorting and sampling of the levels),
      * "search" (neighbour lists), "network" (all layers but the last), "pairs" (pair impulses), "advance"
-     * (new momenta and positions), "contact", "commit". More may come. */
+     * (new momenta and positions), "relaxation", "contact", "divergence", "commit". More may come. */
     ascc_stage_time stage[ASCC_MAX_STAGES];
     /* Of the last step: */
     uint64_t level_points[16]; /* points on each level; level 0: fluid and the walls it sees */
@@ -539,6 +544,10 @@ typedef struct ascc_step_statistics {
     /* Of the run, quanta of momentum, exact; [2] is 0 in 2D. before + external - wall = after, if the
      * model conserves momentum; else the difference is what its last layer made or lost. */
     int64_t momentum_before[3], momentum_after[3], external_impulse[3], wall_impulse[3];
+    /* Of the last step, if the model has a relaxation (docs/method.md): before it, and as its last sweep
+     * began, by what sweeps predict; and how many there were. */
+    ascc_compression compression_before, compression_after;
+    uint64_t sweeps;
 } ascc_step_statistics;
 
 ASCC_API ascc_status ascc_step_get_statistics(const ascc_step *step,

@@ -692,6 +692,83 @@ static int pair_impulses(const float *term, const double factor[4], const double
 }
 #endif
 
+/* ---- Relaxation ---- */
+
+static void spline(const ascc_pairs *pairs, const uint32_t *neighbor, size_t k, float volume,
+                   const float *volumes, float sum[8])
+{
+    const vector zero = fill(0.0f), one = fill(1.0f), half = fill(0.5f);
+    vector value_sum = zero, x_sum = zero, y_sum = zero, z_sum = zero, square_sum = zero;
+    for (size_t i = k; i % LANES; i++) {
+        pairs->x[i] = pairs->y[i] = pairs->z[i] = 0.0f;
+        pairs->distance[i] = 1.0f;
+    }
+    for (size_t i = 0; i < k; i += LANES) {
+        vector amount = fill(volume);
+        if (volumes && k - i >= LANES) {
+            amount = gather_lanes(volumes, neighbor + i);
+        } else if (volumes) {
+            float lane[LANES] = {0};
+            for (size_t l = 0; l < k - i; l++)
+                lane[l] = volumes[neighbor[i + l]];
+            amount = load(lane);
+        }
+        const vector q = load(pairs->distance + i);
+        const vector far = larger(minus(one, q), zero), near = larger(minus(half, q), zero);
+        const vector far2 = times(far, far), near2 = times(fill(4.0f), times(near, near));
+        const vector value =
+            times(times(fill(2.0f), amount), minus(times(far2, far), times(near2, near)));
+        const vector slope = times(times(fill(6.0f), amount), minus(far2, near2));
+        const vector x = times(slope, load(pairs->x + i)), y = times(slope, load(pairs->y + i));
+        const vector z = times(slope, load(pairs->z + i));
+        store(pairs->distance + i, value);
+        store(pairs->x + i, x);
+        store(pairs->y + i, y);
+        store(pairs->z + i, z);
+        value_sum = add(value_sum, value);
+        x_sum = add(x_sum, x);
+        y_sum = add(y_sum, y);
+        z_sum = add(z_sum, z);
+        square_sum = fused(x, x, fused(y, y, fused(z, z, square_sum)));
+    }
+    store_totals(sum, value_sum, x_sum, y_sum);
+    store_totals(sum + 3, z_sum, square_sum, zero);
+    sum[7] = 0.0f;
+}
+
+static void push(const ascc_gradients *pairs, size_t begin, size_t end, const float *pressure,
+                 float *const own[3], float *const move[3])
+{
+    for (size_t i = begin; i < end; i++) {
+        vector x = fill(0.0f), y = x, z = x;
+        for (size_t k = pairs->start[i]; k < pairs->end[i]; k += LANES) {
+            vector p = gather_lanes(pressure, pairs->neighbor + k);
+            if (pairs->weight)
+                p = times(p, load(pairs->weight + k));
+            x = fused(p, load(pairs->g[0] + k), x);
+            y = fused(p, load(pairs->g[1] + k), y);
+            z = fused(p, load(pairs->g[2] + k), z);
+        }
+        float sum[4];
+        store_totals(sum, x, y, z);
+        for (size_t c = 0; c < 3; c++)
+            move[c][i] = -(pressure[i] * own[c][i] + sum[c]);
+    }
+}
+
+static void divergence(const ascc_gradients *pairs, size_t begin, size_t end, float *const own[3],
+                       float *const move[3], float *change)
+{
+    for (size_t i = begin; i < end; i++) {
+        vector sum = fill(0.0f);
+        for (size_t k = pairs->start[i]; k < pairs->end[i]; k += LANES)
+            for (size_t c = 0; c < 3; c++)
+                sum = fused(load(pairs->g[c] + k), gather_lanes(move[c], pairs->neighbor + k), sum);
+        change[i] =
+            own[0][i] * move[0][i] + own[1][i] * move[1][i] + own[2][i] * move[2][i] - total(sum);
+    }
+}
+
 /* ---- The way back, in training ---- */
 
 /* One pair, `vectors` vectors of its row. */
@@ -762,6 +839,9 @@ void ASCC_VARIANT(ascc_kernels *kernels)
     kernels->multiply = multiply;
     kernels->pair_terms = pair_terms;
     kernels->pair_impulses = pair_impulses;
+    kernels->spline = spline;
+    kernels->push = push;
+    kernels->divergence = divergence;
     kernels->scatter = scatter;
     kernels->dot = dot;
 }

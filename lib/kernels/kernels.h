@@ -26,6 +26,15 @@ typedef struct ascc_pairs {
     float *distance;  /* with mapping 3, which turns x, y, z into unit vectors (0 at the centre) */
 } ascc_pairs;
 
+/* A gradient for each pair of each row: row i has those from start[i] to end[i], filled up to a multiple
+ * of 8 with zeros; neighbours are rows below 2^31. */
+typedef struct ascc_gradients {
+    const size_t *start, *end;
+    const uint32_t *neighbor;
+    const float *g[3];
+    const float *weight; /* or NULL */
+} ascc_gradients;
+
 typedef struct ascc_kernels {
     /* Appends to found[] those of points [begin, end) whose squared distance from (x, y, z) is at
      * most limit (in squared units of the integers); ascending. Returns how many. found has room
@@ -94,6 +103,22 @@ typedef struct ascc_kernels {
     int (*pair_impulses)(const float *term, const double factor[4], const double *mass,
                          size_t mass_step, double limit, const uint32_t *neighbor, size_t k,
                          int64_t own[4], int64_t *sum);
+
+    /* The cubic spline w = 2 (1 - q)^3 - 8 (1/2 - q)^3, no bracket below 0, of k pairs with unit vectors and
+     * distances q (geometry, mapping 3), times volume, or with volumes times volumes[neighbor]: distance
+     * becomes that value, x, y, z minus its slope times the unit vector. sum[8] = the sums of value, x,
+     * y, z, and of x^2 + y^2 + z^2, then zeros; 8 partial sums by pair mod 8. Fills up with zeros. */
+    void (*spline)(const ascc_pairs *pairs, const uint32_t *neighbor, size_t k, float volume,
+                   const float *volumes, float sum[8]);
+
+    /* Of rows [begin, end): move[c][i] = -(pressure[i] own[c][i] + sum over pairs of weight
+     * pressure[neighbor] g[c]); a pair's weight is 1 without weights. 8 partial sums by pair mod 8. */
+    void (*push)(const ascc_gradients *pairs, size_t begin, size_t end, const float *pressure,
+                 float *const own[3], float *const move[3]);
+
+    /* Of rows [begin, end): change[i] = own[i] . move[i] - sum over pairs of g . move[neighbor]. */
+    void (*divergence)(const ascc_gradients *pairs, size_t begin, size_t end, float *const own[3],
+                       float *const move[3], float *change);
 
     /* Of the way back: gradient[neighbor[i]][a] += sum over members m of factor[m * stride + i] *
      * column[m][a], pairs in order; members come in bumps of so many harmonics, and a bump whose

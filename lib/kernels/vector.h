@@ -45,6 +45,12 @@ static inline vector times(vector a, vector b)
     return _mm256_mul_ps(a, b);
 }
 
+/* p[index[lane]], indices below 2^31. */
+static inline vector gather_lanes(const float *p, const uint32_t *index)
+{
+    return _mm256_i32gather_ps(p, _mm256_loadu_si256((const __m256i *)index), 4);
+}
+
 /* a * b + c, rounded once. */
 static inline vector fused(vector a, vector b, vector c)
 {
@@ -250,6 +256,14 @@ static inline void store_whole(int32_t *p, vector a)
 #endif
 
 #if !defined(ASCC_USE_AVX2)
+static inline vector gather_lanes(const float *p, const uint32_t *index)
+{
+    float lane[LANES];
+    for (int i = 0; i < LANES; i++)
+        lane[i] = p[index[i]];
+    return load(lane);
+}
+
 static inline size_t store_positive(uint32_t *p, uint32_t first, vector a)
 {
     float lane[LANES];

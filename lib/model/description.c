@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "operation.h"
+#include "relaxation.h"
 
 #define SHORTEST_STEP 0.1 /* of the time step stated */
 #define ASCC_MAX_TYPES 32 /* words that `type` may be */
@@ -230,6 +231,15 @@ static void read_layers(ascc_plan_builder *builder, ascc_reader *reader)
     }
 }
 
+/* The operation of an output by its type. */
+static const ascc_operation *find_operation(const char *type)
+{
+    const ascc_operation *const *o = ascc_operations;
+    while (!(*o)->impulses || strcmp((*o)->type, type) != 0)
+        o++;
+    return *o;
+}
+
 /* One number for all directions, or one for each. */
 static void read_scale(ascc_reader *reader, uint32_t object, int32_t dimension, double *scale)
 {
@@ -251,6 +261,12 @@ static void read_output(ascc_plan_builder *builder, ascc_reader *reader)
     const char *name[ASCC_MAX_TENSORS] = {NULL};
     ascc_output output = {.half_axis = -1};
     ascc_reader_where(reader, "network");
+    if (builder->plan.relaxation.sweeps && !ascc_reader_has(reader, 0, "output")) {
+        output.term.operation = find_operation("none");
+        if (reader->status == ASCC_OK)
+            reader->status = ascc_plan_set_output(builder, &output, name);
+        return;
+    }
     const uint32_t object = ascc_reader_object(reader, 0, "output");
     ascc_reader_where(reader, "output");
     if (reader->status != ASCC_OK)
@@ -280,6 +296,7 @@ ascc_status ascc_description_read(ascc_plan_builder *builder, const char *text)
     } else {
         read_head(builder, &reader);
         read_layers(builder, &reader);
+        ascc_relaxation_read(&reader, 0, &builder->plan);
         read_output(builder, &reader);
         ascc_reader_where(&reader, "network");
         ascc_reader_end(&reader, 0);

@@ -24,6 +24,7 @@
 #define ASCC_MAX_BUMPS 8    /* functions of a radial basis */
 #define ASCC_MAX_ORDER 2
 #define ASCC_MAX_FEATURES 8
+#define ASCC_MAX_SWEEPS 32  /* of a relaxation */
 #define ASCC_PLAN_MIN 1e-15 /* smallest and largest length, time or density a file may state */
 #define ASCC_PLAN_MAX 1e15
 
@@ -120,6 +121,26 @@ static inline double ascc_output_limit(const ascc_output *output)
     return output->limit > 0.0 ? output->limit / scale : HUGE_VAL;
 }
 
+/* A relaxation shares the neighbour list of a term that looks farther, by this factor at most. */
+#define ASCC_LONGER 2.0
+
+/* Pressure from a few sweeps after the network, and one convolution of it (docs/method.md). */
+typedef struct ascc_relaxation {
+    int32_t sweeps; /* 0 = there is none */
+    int32_t divergence_sweeps;
+    double omega[ASCC_MAX_SWEEPS]; /* of each sweep */
+    double epsilon;                /* of the lattice's response, added to each particle's own */
+    double support;                /* of the cubic spline, m */
+    double rest_volume;            /* of a particle, m^dimension */
+    double limit;                  /* the greatest correction of a position by one pair, m */
+    double repulsion, stiffness;   /* pairs nearer than this, m, part by this share of the lack */
+    double contact;                /* as of an output, for a model that has none there; m */
+    /* What follows: */
+    double reach;            /* of the neighbour lists, m */
+    double amount;           /* the spline's middle times rest_volume */
+    double lattice_response; /* D of a lattice at rest, supports^-2 */
+} ascc_relaxation;
+
 typedef enum ascc_feature {
     ASCC_FEATURE_ONE,
     ASCC_FEATURE_VELOCITY, /* fluid: after external forces, m/s; dimension channels */
@@ -167,6 +188,7 @@ typedef struct ascc_plan {
     ascc_layer *layer;
     ascc_term *term;
     ascc_output output;
+    ascc_relaxation relaxation;
     uint64_t parameter_count;
 } ascc_plan;
 

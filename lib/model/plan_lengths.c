@@ -26,7 +26,9 @@ void ascc_plan_radii(const ascc_plan *plan, double *smallest, double *largest)
         *smallest = radius > 0.0 ? fmin(*smallest, radius) : *smallest;
         *largest = fmax(*largest, radius);
     }
-    *largest = fmax(*largest, plan->output.walls.radius);
+    *largest = fmax(*largest, fmax(plan->output.walls.radius, plan->relaxation.reach));
+    if (plan->relaxation.sweeps && *smallest > ASCC_LONGER * plan->relaxation.reach)
+        *smallest = plan->relaxation.reach;
     if (*largest == 0.0) /* a network of dense layers: any scale will do */
         *smallest = *largest = plan->spacing > 0.0 ? plan->spacing : 1.0;
 }
@@ -42,7 +44,7 @@ static double layer_radius(const ascc_plan *plan, const ascc_layer *layer)
 
 double ascc_plan_support_radius(const ascc_plan *plan)
 {
-    const double own = radius_of(plan, plan->term_count);
+    const double own = fmax(radius_of(plan, plan->term_count), plan->relaxation.support);
     const int32_t source = plan->output.term.source;
     return own > 0.0 || source < 2 ? own : layer_radius(plan, &plan->layer[source - 2]);
 }
@@ -55,6 +57,13 @@ static double sampling_reach(const ascc_plan *plan, int32_t set)
     const double diagonal =
         plan->level[set - ASCC_SET_LEVEL + 1].voxel * sqrt((double)plan->dimension);
     return plan->sampling == ASCC_SAMPLING_CORNERS ? diagonal * (1.0 + plan->hysteresis) : diagonal;
+}
+
+/* A density is carried over two supports by each sweep. */
+static double relaxation_reach(const ascc_plan *plan)
+{
+    const ascc_relaxation *r = &plan->relaxation;
+    return 2.0 * r->support * (r->sweeps + r->divergence_sweeps);
 }
 
 double ascc_plan_receptive_radius(const ascc_plan *plan)
@@ -72,12 +81,14 @@ double ascc_plan_receptive_radius(const ascc_plan *plan)
         reach[i + 2] = farthest;
     }
     const double last = fmax(radius_of(plan, plan->term_count), plan->output.walls.radius);
-    return last + reach[plan->output.term.source];
+    return last + reach[plan->output.term.source] + relaxation_reach(plan);
 }
 
 int32_t ascc_plan_neighbor_limit(const ascc_plan *plan)
 {
     int32_t most = 0;
+    if (plan->relaxation.sweeps)
+        return 0;
     for (int32_t t = 0; t <= plan->term_count; t++) {
         ascc_list_key key[ASCC_MAX_LISTS];
         if (!lists_of(plan, t, key))

@@ -57,6 +57,28 @@ static void prepare_term(ascc_network *network, int32_t t, int32_t set)
         network->wants[1] |= ASCC_WANTS_RAW;
 }
 
+/* Pairs of a relaxation: a list that is made anyway, if it is not much longer than needed. */
+static int32_t relaxation_key(ascc_network *network, int32_t source)
+{
+    const double reach = network->plan->relaxation.reach;
+    const ascc_list_key wanted = {.query = ASCC_SET_FLUID, .source = source, .radius = reach};
+    int32_t best = -1;
+    for (int32_t k = 0; k < network->key_count; k++) {
+        const ascc_list_key *key = &network->key[k];
+        if (key->query == wanted.query && key->source == source && !key->skip_self && !key->limit &&
+            key->cube == 0.0 && key->radius >= (1.0 - 1e-9) * reach &&
+            key->radius <= ASCC_LONGER * reach &&
+            (best < 0 || key->radius < network->key[best].radius))
+            best = k;
+    }
+    return best < 0 ? find_key(network, &wanted) : best;
+}
+
+static size_t key_capacity(const ascc_plan *plan)
+{
+    return ((size_t)plan->term_count + 1) * ASCC_MAX_LISTS + 2;
+}
+
 ascc_status ascc_network_create(ascc_network *network, const ascc_allocator *allocator,
                                 const ascc_plan *plan, const ascc_packed *packed,
                                 int32_t max_neighbors, ascc_message *message)
@@ -67,7 +89,7 @@ ascc_status ascc_network_create(ascc_network *network, const ascc_allocator *all
                               .packed = packed,
                               .value_count = plan->layer_count + 2,
                               .max_neighbors = max_neighbors};
-    network->key = ascc_allocate(allocator, terms * ASCC_MAX_LISTS, sizeof *network->key);
+    network->key = ascc_allocate(allocator, key_capacity(plan), sizeof *network->key);
     network->term_key = ascc_allocate(allocator, terms, sizeof *network->term_key);
     network->wants = ascc_allocate(allocator, (size_t)network->value_count, 1);
     if (!network->key || !network->term_key || !network->wants) {
@@ -79,6 +101,11 @@ ascc_status ascc_network_create(ascc_network *network, const ascc_allocator *all
         for (int32_t t = 0; t < plan->layer[l].term_count; t++)
             prepare_term(network, plan->layer[l].first_term + t, plan->layer[l].set);
     prepare_term(network, plan->term_count, ascc_network_set(network, plan->output.term.source));
+    for (int i = 0; i < 2; i++)
+        network->relaxation_key[i] =
+            plan->relaxation.sweeps
+                ? relaxation_key(network, i == 0 ? ASCC_SET_FLUID : ASCC_SET_BOUNDARY)
+                : -1;
     return ASCC_OK;
 }
 
@@ -89,7 +116,7 @@ void ascc_network_destroy(ascc_network *network)
         return;
     const size_t terms = (size_t)network->plan->term_count + 1;
     if (network->key)
-        ascc_release(a, network->key, terms * ASCC_MAX_LISTS, sizeof *network->key);
+        ascc_release(a, network->key, key_capacity(network->plan), sizeof *network->key);
     if (network->term_key)
         ascc_release(a, network->term_key, terms, sizeof *network->term_key);
     if (network->wants)
@@ -287,6 +314,8 @@ ascc_status ascc_network_demand(ascc_network_run *run, const ascc_network *netwo
         status = demand_output(run);
     for (int32_t l = network->plan->layer_count - 1; status == ASCC_OK && l >= 0; l--)
         status = demand_layer(run, l);
+    for (int i = 0; status == ASCC_OK && i < 2 && network->relaxation_key[i] >= 0; i++)
+        status = ascc_rows_make(&run->rows[network->relaxation_key[i]], tools, NULL);
     for (int32_t k = 0; status == ASCC_OK && k < network->key_count; k++) {
         const ascc_rows *rows = &run->rows[k];
         if (expected)

@@ -24,8 +24,9 @@ typedef struct ascc_network {
     int32_t key_count;
     ascc_list_key *key;                  /* [key_count] of all neighbour lists */
     int32_t (*term_key)[ASCC_MAX_LISTS]; /* [term_count + 1], last: the output; -1 = none */
-    uint8_t *wants;                      /* [value_count] ASCC_WANTS_* */
-    int32_t max_neighbors;               /* of a point, before LIMIT */
+    int32_t relaxation_key[2]; /* fluid and walls around the fluid; -1 = there is no relaxation */
+    uint8_t *wants;            /* [value_count] ASCC_WANTS_* */
+    int32_t max_neighbors;     /* of a point, before LIMIT */
 } ascc_network;
 
 ascc_status ascc_network_create(ascc_network *network, const ascc_allocator *allocator,

@@ -147,18 +147,26 @@ static void hold_rows(void *data, size_t begin, size_t end, int32_t slot)
         }
 }
 
+/* The list of whoever asks for contact: the output, or the relaxation. */
+static const ascc_rows *walls_around(const ascc_network_run *run)
+{
+    return run->plan->output.contact > 0.0 ? ascc_term_list(run, &run->plan->output.term, 1)
+                                           : &run->rows[run->network->relaxation_key[1]];
+}
+
 ascc_status ascc_stage_contact(ascc_step_state *state)
 {
     const ascc_plan *plan = state->network->plan;
     const ascc_particles *p = state->particles;
-    if (!(plan->output.contact > 0.0) || p->fluid_count == 0)
+    const double distance = fmax(plan->output.contact, plan->relaxation.contact);
+    if (!(distance > 0.0) || p->fluid_count == 0)
         return ASCC_OK;
     const double spacing = plan->spacing / state->length_unit;
     contact_job job = {.run = &state->run,
-                       .rows = ascc_term_list(&state->run, &plan->output.term, 1),
+                       .rows = walls_around(&state->run),
                        .p = p,
                        .time_step = state->motion->time_step,
-                       .distance = plan->output.contact / state->length_unit,
+                       .distance = distance / state->length_unit,
                        .disc_square = DISC * DISC * spacing * spacing,
                        .slack = SLACK * spacing,
                        .nothing = NOTHING * spacing,

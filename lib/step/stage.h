@@ -9,6 +9,7 @@
 
 #include "network/pair_sum.h"
 #include "points/particles.h"
+#include "wall_volumes.h"
 
 /* What one step does from outside, in the host's units. */
 typedef struct ascc_motion {
@@ -37,6 +38,7 @@ typedef struct ascc_step_state {
     double length_unit;                                   /* m */
     size_t *expected;                                     /* of the network's neighbour lists */
     ascc_status (*engine)(struct ascc_step_state *state); /* engine.h */
+    ascc_wall_volumes *walls;
     ascc_search_tools tools;
     ascc_step_statistics *statistics; /* also the times of stages */
     double since;                     /* when the stage under way began, s */
@@ -57,6 +59,11 @@ ascc_status ascc_stage_forces(ascc_step_state *state);
 ascc_status ascc_stage_sight(ascc_step_state *state);
 /* New momenta and positions. errors: RANGE, NOT_FINITE; the message names the particle. */
 ascc_status ascc_stage_advance(ascc_step_state *state);
+/* Pressure from densities, and what it moves (docs/method.md); nothing, and no time of its own, without a
+ * relaxation in the model. errors: MEMORY, RANGE, LIMIT. */
+ascc_status ascc_stage_relaxation(ascc_step_state *state);
+/* The same for the velocities at the new positions, which stay. errors: MEMORY, RANGE. */
+ascc_status ascc_stage_divergence(ascc_step_state *state);
 /* Walls that nothing passes. errors: RANGE. */
 ascc_status ascc_stage_contact(ascc_step_state *state);
 

@@ -78,6 +78,7 @@ static ascc_status fill_step(ascc_step *step, const ascc_step_options *o, ascc_m
     }
     memset(step->expected, 0, keys * sizeof *step->expected);
     ascc_arena_open(&step->arena, &context->allocator);
+    step->walls.allocator = &context->allocator;
     step->statistics.level_count = model->plan.level_count;
     return ASCC_OK;
 }
@@ -131,6 +132,7 @@ void ascc_step_destroy(ascc_step **step)
     ascc_release(&context->allocator, s->expected, (size_t)s->network.key_count,
                  sizeof *s->expected);
     ascc_arena_close(&s->arena);
+    ascc_wall_volumes_close(&s->walls);
     ascc_network_destroy(&s->network);
     ascc_model_release(s->model);
     s->magic = 0;
@@ -202,10 +204,9 @@ static const struct {
     const char *name; /* NULL: it names its own */
     ascc_stage run;
 } stages[] = {
-    {"forces", ascc_stage_forces},
-    {NULL, run_engine},
-    {"advance", ascc_stage_advance},
-    {"contact", ascc_stage_contact},
+    {"forces", ascc_stage_forces},   {NULL, run_engine},
+    {"advance", ascc_stage_advance}, {NULL, ascc_stage_relaxation},
+    {"contact", ascc_stage_contact}, {NULL, ascc_stage_divergence},
 };
 
 ascc_status ascc_step_once(ascc_step *step, ascc_particles *p, const ascc_motion *motion,
@@ -219,6 +220,7 @@ ascc_status ascc_step_once(ascc_step *step, ascc_particles *p, const ascc_motion
         .length_unit = step->length_unit,
         .expected = step->expected,
         .engine = step->engine,
+        .walls = &step->walls,
         .tools = {arena, step->context->workers, &step->context->kernels, &step->message},
         .statistics = &step->statistics,
         .since = ascc_clock()};

@@ -16,6 +16,7 @@ struct ascc_step {
     size_t *expected; /* [key_count of the network] neighbours of the last step */
     ascc_engine engine;
     ascc_arena arena;
+    ascc_wall_volumes walls;
     double *acceleration; /* the host's, [fluid][dimension] */
     size_t acceleration_capacity;
     unsigned char *kept; /* the state before the first of several substeps */

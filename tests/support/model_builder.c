@@ -478,6 +478,8 @@ static void add_head(random_network *n)
     if (o->boundary_crop > 0.0)
         model_text_add(&n->text, ",\"boundary_crop\":%s",
                        model_number(o->boundary_crop * o->spacing));
+    if (o->relaxation)
+        model_text_add(&n->text, ",\"relaxation\":%s", o->relaxation);
     if (o->levels == 1)
         return;
     const int farthest = strcmp(o->method, "farthest") == 0;

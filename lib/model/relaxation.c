@@ -1,0 +1,126 @@
+/* Reads a relaxation and refuses constants with which it would not settle. SPDX-License-Identifier: MIT */
+#include "relaxation.h"
+
+#include <math.h>
+#include <string.h>
+
+/* Neighbour lists of a relaxation reach this far beyond its support, in spacings: they are made where
+ * the network sees the particles, and it moves them. */
+#define MARGIN 0.25
+/* Supports in units of the distance at which a lattice of resting particles has them. */
+#define SMALLEST_SUPPORT 1.5
+#define LARGEST_SUPPORT 4.0
+/* Above the largest eigenvalue of a sweep, D^-1 B B^T: 3.2 on a cubic lattice at rest, 2.4 on a square
+ * one, more where it is compressed. */
+#define LARGEST_EIGENVALUE 4.0
+
+/* The positive root of x^d = v by Newton, in any build the same. */
+static double root(double v, int32_t d)
+{
+    double x = v > 1.0 ? v : 1.0;
+    for (int i = 0; i < 200; i++)
+        x -= (d == 2 ? x * x - v : x * x * x - v) / (d == 2 ? 2.0 * x : 3.0 * x * x);
+    return x;
+}
+
+/* D of a particle inside an unbounded square or cubic lattice, in supports^-2. */
+static double lattice_response(double amount, double apart, int32_t d)
+{
+    const int reach = (int)ceil(1.0 / apart);
+    double sum = 0.0;
+    for (int z = d == 3 ? -reach : 0; z <= (d == 3 ? reach : 0); z++)
+        for (int y = -reach; y <= reach; y++)
+            for (int x = -reach; x <= reach; x++) {
+                const double q = apart * sqrt((double)(x * x + y * y + z * z));
+                const double far = 1.0 - q, near = 0.5 - q;
+                const double slope =
+                    q >= 1.0 ? 0.0 : 6.0 * (far * far - (near > 0.0 ? 4.0 * near * near : 0.0));
+                sum += amount * slope * amount * slope;
+            }
+    return sum;
+}
+
+/* Volumes are counted in what the spline sums to. */
+static void find_constants(ascc_reader *reader, const ascc_plan *plan, ascc_relaxation *r)
+{
+    static const double pi = 3.14159265358979323846;
+    const int32_t d = plan->dimension;
+    const double support = d == 2 ? r->support * r->support : r->support * r->support * r->support;
+    const double apart = root(r->rest_volume / support, d);
+    if (!(SMALLEST_SUPPORT * apart <= 1.0 && LARGEST_SUPPORT * apart >= 1.0)) {
+        ascc_reader_fail(reader,
+                         "'support' must be %g to %g times the distance of particles at rest, "
+                         "%g m by 'rest_volume'",
+                         SMALLEST_SUPPORT, LARGEST_SUPPORT, apart * r->support);
+        return;
+    }
+    r->amount = (d == 2 ? 40.0 / (7.0 * pi) : 8.0 / pi) * r->rest_volume / support;
+    r->lattice_response = lattice_response(r->amount, apart, d);
+    r->reach = r->support + MARGIN * plan->spacing;
+}
+
+/* What the sweeps leave of an excess is their product of 1 - omega lambda, for every eigenvalue lambda. */
+static void check_omega(ascc_reader *reader, const ascc_relaxation *r)
+{
+    enum { STEPS = 400 };
+    for (int i = 0; i <= STEPS; i++) {
+        const double eigenvalue = LARGEST_EIGENVALUE * i / STEPS;
+        double left = 1.0;
+        for (int32_t k = 0; k < r->sweeps; k++)
+            left *= 1.0 - r->omega[k] * eigenvalue;
+        if (!(fabs(left) <= 1.0 + 1e-9)) {
+            ascc_reader_fail(reader,
+                             "sweeps of this 'omega' would not settle: 0.5 is the most of one "
+                             "number for all");
+            return;
+        }
+    }
+}
+
+static void read_omega(ascc_reader *reader, uint32_t object, ascc_relaxation *r)
+{
+    const ascc_json *json = reader->json;
+    for (uint32_t i = ascc_json_first(json, object); i != 0; i = json->value[i].next)
+        if (strcmp(json->value[i].name, "omega") == 0 && json->value[i].kind == ASCC_JSON_ARRAY) {
+            ascc_reader_numbers(reader, object, "omega", r->sweeps, 1e-3, 4.0, r->omega);
+            return;
+        }
+    const double omega = ascc_reader_number(reader, object, "omega", 1e-3, 4.0);
+    for (int32_t k = 0; k < r->sweeps; k++)
+        r->omega[k] = omega;
+}
+
+void ascc_relaxation_read(ascc_reader *reader, uint32_t object, ascc_plan *plan)
+{
+    if (!ascc_reader_has(reader, object, "relaxation"))
+        return;
+    const uint32_t o = ascc_reader_object(reader, object, "relaxation");
+    ascc_relaxation r = {0};
+    ascc_reader_where(reader, "relaxation");
+    r.support = ascc_reader_number(reader, o, "support", ASCC_PLAN_MIN, ASCC_PLAN_MAX);
+    r.rest_volume = ascc_reader_number(reader, o, "rest_volume", 1e-45, 1e45);
+    r.sweeps = ascc_reader_integer(reader, o, "sweeps", 1, ASCC_MAX_SWEEPS);
+    if (reader->status == ASCC_OK)
+        read_omega(reader, o, &r);
+    r.epsilon = ascc_reader_number(reader, o, "epsilon", 1e-3, 10.0);
+    r.limit = ascc_reader_number(reader, o, "limit", 1e-6 * r.support, r.support);
+    if (ascc_reader_has(reader, o, "divergence"))
+        r.divergence_sweeps = ascc_reader_integer(reader, o, "divergence", 0, ASCC_MAX_SWEEPS);
+    if (ascc_reader_has(reader, o, "contact"))
+        r.contact = ascc_reader_number(reader, o, "contact", 0.0, r.support);
+    if (ascc_reader_has(reader, o, "repulsion")) {
+        const uint32_t p = ascc_reader_object(reader, o, "repulsion");
+        ascc_reader_where(reader, "relaxation 'repulsion'");
+        r.repulsion = ascc_reader_number(reader, p, "distance", 0.0, 0.5 * r.support);
+        r.stiffness = ascc_reader_number(reader, p, "stiffness", 0.0, 1.0);
+        ascc_reader_end(reader, p);
+        ascc_reader_where(reader, "relaxation");
+    }
+    ascc_reader_end(reader, o);
+    if (reader->status == ASCC_OK)
+        find_constants(reader, plan, &r);
+    if (reader->status == ASCC_OK)
+        check_omega(reader, &r);
+    ascc_reader_where(reader, "network");
+    plan->relaxation = r;
+}

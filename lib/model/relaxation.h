@@ -1,0 +1,12 @@
+/* A pressure relaxation after the network: its constants, from a description (docs/method.md, section on
+ * relaxation). SPDX-License-Identifier: MIT */
+#ifndef ASCC_MODEL_RELAXATION_H
+#define ASCC_MODEL_RELAXATION_H
+
+#include "file/json_reader.h"
+#include "plan.h"
+
+/* Reads the member `relaxation` of the description, if it is there, and finds what follows from it. */
+void ascc_relaxation_read(ascc_reader *reader, uint32_t object, ascc_plan *plan);
+
+#endif

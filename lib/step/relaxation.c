@@ -1,0 +1,589 @@
+/* Pressure from densities, by a few weighted Jacobi sweeps, and the one convolution that applies it (paper
+ * Eq. 2; docs/method.md). SPDX-License-Identifier: MIT
+ *
+ * In supports, with g_ij = V grad_i w(x_i - x_j) towards j, c the excess of density and p the pressure:
+ *
+ *     d_i = - sum_j (p_i + p_j) g_ij - sum_walls p_i g_ib                  push
+ *     c_i = excess_i + sum_j g_ij . (d_i - d_j) + sum_walls g_ib . d_i     divergence
+ *     p_i = max(0, p_i + omega c_i / (D_i + epsilon D_lattice))
+ *
+ * Geometry stays as it is while sweeps go on; d is applied once, at the end, as pair impulses. The
+ * same sweeps on velocities, with their divergence in place of the excess, end their approach.
+ */
+#include <inttypes.h>
+#include <math.h>
+#include <string.h>
+
+#include "stage.h"
+
+#define ROWS 256 /* of a block of work */
+/* How far the network may take a particle from where it saw it, units: differences fit 32 bits. */
+#define FARTHEST (((int64_t)1 << 30) - ((int64_t)1 << 27))
+/* Compressions are summed in integers. */
+#define COMPRESSION_UNIT 0x1p-24
+/* At a free surface, where density lacks more than this, a divergence means nothing. */
+#define SURFACE 0.35f
+
+/* Rows are those of ASCC_SET_FLUID. Vectors are three arrays. */
+typedef struct relaxation {
+    ascc_step_state *state;
+    const ascc_relaxation *constants;
+    const ascc_rows *rows, *wall_rows;
+    size_t count;
+    float inverse_support;    /* of a unit */
+    int32_t *low[3];          /* positions */
+    const float *wall_volume; /* of wall rows */
+    ascc_pair_sum sum;
+    /* What the pairs are: */
+    size_t *start, *end; /* [count + 1], [count] */
+    uint32_t *neighbor;
+    float *g[3], *weight;
+    float *own[3];  /* sum of g, walls included */
+    float *push[3]; /* the same by weight */
+    float *excess, *response, *pressure, *change, *move[3];
+    float *scratch; /* [slots][4][room] */
+    size_t room;
+    float omega;     /* of the sweep under way */
+    float repulsion; /* below this distance, in supports */
+    atomic_size_t bad;
+    atomic_uint_least64_t compression, largest;
+} relaxation;
+
+static ascc_coordinates coordinates(int32_t *const low[3])
+{
+    return (ascc_coordinates){low[0], low[1], low[2]};
+}
+
+static ascc_gradients gradients(const relaxation *r)
+{
+    return (ascc_gradients){.start = r->start,
+                            .end = r->end,
+                            .neighbor = r->neighbor,
+                            .g = {r->g[0], r->g[1], r->g[2]},
+                            .weight = r->sum.uniform ? NULL : r->weight};
+}
+
+/* ---- Memory ---- */
+
+static bool lend_vector(ascc_arena *arena, float *vector[3], size_t count)
+{
+    for (int c = 0; c < 3; c++) {
+        vector[c] = ascc_arena_lend(arena, count, sizeof *vector[c]);
+        if (!vector[c])
+            return false;
+    }
+    return true;
+}
+
+static size_t whole_vectors(size_t count)
+{
+    return (count + 7) / 8 * 8;
+}
+
+/* Where each row's pairs begin, with room for all that its list has. */
+static size_t place_rows(relaxation *r)
+{
+    size_t at = 0;
+    for (size_t i = 0; i < r->count; i++) {
+        r->start[i] = at;
+        at += whole_vectors(r->rows->count[i]);
+    }
+    return at;
+}
+
+static bool lend_memory(relaxation *r)
+{
+    ascc_arena *arena = r->state->tools.arena;
+    const size_t n = r->count;
+    const size_t slots = (size_t)ascc_workers_count(r->state->tools.workers);
+    float **const numbers[] = {&r->excess, &r->response, &r->pressure, &r->change};
+    bool room = true;
+    for (size_t i = 0; i < sizeof numbers / sizeof *numbers; i++)
+        room &= (*numbers[i] = ascc_arena_lend(arena, n, sizeof(float))) != NULL;
+    for (int c = 0; c < 3; c++)
+        room &= (r->low[c] = ascc_arena_lend(arena, n, sizeof(int32_t))) != NULL;
+    r->start = ascc_arena_lend(arena, n, sizeof *r->start);
+    r->end = ascc_arena_lend(arena, n, sizeof *r->end);
+    if (!room || !r->start || !r->end || !lend_vector(arena, r->own, n) ||
+        !lend_vector(arena, r->move, n))
+        return false;
+    const size_t pairs = place_rows(r);
+    r->room = whole_vectors(ascc_max_size(r->rows->longest, r->wall_rows->longest));
+    r->neighbor = ascc_arena_lend(arena, pairs, sizeof *r->neighbor);
+    r->scratch = ascc_arena_lend(arena, slots * r->room, 4 * sizeof *r->scratch);
+    memcpy(r->push, r->own, sizeof r->push);
+    if (!r->sum.uniform) {
+        r->weight = ascc_arena_lend(arena, pairs, sizeof *r->weight);
+        if (!r->weight || !lend_vector(arena, r->push, n))
+            return false;
+    }
+    return r->neighbor && r->scratch && lend_vector(arena, r->g, pairs);
+}
+
+/* ---- Geometry ---- */
+
+static bool find_place(relaxation *r, size_t i)
+{
+    const ascc_hierarchy *h = &r->state->hierarchy;
+    const size_t d = (size_t)r->state->particles->dimension;
+    const size_t row = ascc_hierarchy_host_row(h, ASCC_SET_FLUID, i);
+    for (size_t c = 0; c < 3; c++) {
+        int64_t at = 0;
+        if (c < d &&
+            !ascc_scale_apply(&h->scale,
+                              r->state->advance.position[row * d + c] * r->state->length_unit, &at))
+            return false;
+        const int64_t moved = at - h->set[ASCC_SET_FLUID].position[c][i];
+        if (moved > FARTHEST || moved < -FARTHEST)
+            return false;
+        r->low[c][i] = (int32_t)(uint32_t)(uint64_t)at;
+    }
+    return true;
+}
+
+static void find_places(void *data, size_t begin, size_t end, int32_t slot)
+{
+    (void)slot;
+    relaxation *r = data;
+    for (size_t i = begin; i < end; i++)
+        if (!find_place(r, i)) {
+            ascc_note_first(&r->bad, i);
+            return;
+        }
+}
+
+/* Gradients of a row's pairs into scratch; sums as the kernel gives them. */
+static ascc_pairs look(const relaxation *r, size_t i, const ascc_rows *rows,
+                       int32_t *const source[3], const float *volumes, float *scratch, float sum[8])
+{
+    const ascc_kernels *kernels = r->state->tools.kernels;
+    const ascc_coordinates points = coordinates(source);
+    const uint32_t *neighbor = rows->neighbor + rows->start[i];
+    const ascc_pairs pairs = {.x = scratch,
+                              .y = scratch + r->room,
+                              .z = scratch + 2 * r->room,
+                              .distance = scratch + 3 * r->room};
+    kernels->geometry(&points, neighbor, rows->count[i], r->low[0][i], r->low[1][i], r->low[2][i],
+                      r->inverse_support, ASCC_MAPPING_DIRECTION, &pairs);
+    kernels->spline(&pairs, neighbor, rows->count[i], (float)r->constants->amount, volumes, sum);
+    return pairs;
+}
+
+/* Keeps the pairs of a row that act. */
+static void keep(relaxation *r, size_t i, const ascc_pairs *pairs)
+{
+    const uint32_t *neighbor = r->rows->neighbor + r->rows->start[i];
+    size_t at = r->start[i];
+    for (size_t k = 0; k < r->rows->count[i]; k++) {
+        r->neighbor[at] = neighbor[k];
+        r->g[0][at] = pairs->x[k];
+        r->g[1][at] = pairs->y[k];
+        r->g[2][at] = pairs->z[k];
+        at += pairs->x[k] != 0.0f || pairs->y[k] != 0.0f || pairs->z[k] != 0.0f;
+    }
+    for (r->end[i] = at; (r->end[i] - r->start[i]) % 8; r->end[i]++) {
+        r->neighbor[r->end[i]] = (uint32_t)i;
+        for (int c = 0; c < 3; c++)
+            r->g[c][r->end[i]] = 0.0f;
+    }
+}
+
+/* Of unequal masses: a pair pushes row i by twice the other's share of both masses. Returns D. */
+static float weigh(relaxation *r, size_t i, const float wall[3])
+{
+    float by_weight[3] = {wall[0], wall[1], wall[2]}, squares = 0.0f, along = 0.0f;
+    const double mass = r->sum.mass[i];
+    for (size_t k = r->start[i]; k < r->end[i]; k++) {
+        const double other = r->sum.mass[r->neighbor[k]];
+        const float weight = (float)(ascc_pair_mass(mass, other) / mass);
+        const float back = (float)(ascc_pair_mass(mass, other) / other);
+        r->weight[k] = weight;
+        for (int c = 0; c < 3; c++) {
+            by_weight[c] += weight * r->g[c][k];
+            squares += back * r->g[c][k] * r->g[c][k];
+        }
+    }
+    for (int c = 0; c < 3; c++) {
+        r->push[c][i] = by_weight[c];
+        along += by_weight[c] * r->own[c][i];
+    }
+    return (along > 0.0f ? along : 0.0f) + squares;
+}
+
+static void look_around(void *data, size_t begin, size_t end, int32_t slot)
+{
+    relaxation *r = data;
+    float *scratch = r->scratch + (size_t)slot * 4 * r->room;
+    const float least = (float)(r->constants->epsilon * r->constants->lattice_response);
+    int32_t *const *walls = r->state->hierarchy.set[ASCC_SET_BOUNDARY].low;
+    for (size_t i = begin; i < end; i++) {
+        float sum[8], wall[8] = {0};
+        const ascc_pairs pairs = look(r, i, r->rows, r->low, NULL, scratch, sum);
+        keep(r, i, &pairs);
+        if (r->wall_rows->count[i])
+            (void)look(r, i, r->wall_rows, walls, r->wall_volume, scratch, wall);
+        float square = sum[4];
+        for (int c = 0; c < 3; c++) {
+            r->own[c][i] = sum[1 + c] + wall[1 + c];
+            square += r->own[c][i] * r->own[c][i];
+        }
+        if (!r->sum.uniform)
+            square = weigh(r, i, wall + 1);
+        r->excess[i] = (sum[0] + wall[0]) - 1.0f;
+        r->response[i] = 1.0f / (square + least);
+    }
+}
+
+/* Volumes of the walls that the step sees. */
+static bool lend_volumes(relaxation *r)
+{
+    const ascc_hierarchy *h = &r->state->hierarchy;
+    const size_t count = h->set[ASCC_SET_BOUNDARY].count;
+    float *volume = ascc_arena_lend(r->state->tools.arena, count, sizeof *volume);
+    for (size_t i = 0; volume && i < count; i++)
+        volume[i] = r->state->walls
+                        ->volume[ascc_hierarchy_host_row(h, ASCC_SET_BOUNDARY, i) - h->fluid_count];
+    r->wall_volume = volume;
+    return volume != NULL;
+}
+
+/* Everything that sweeps read. */
+static ascc_status open_relaxation(relaxation *r, ascc_step_state *state)
+{
+    const ascc_network_run *run = &state->run;
+    const ascc_search_tools *tools = &state->tools;
+    const ascc_relaxation *constants = &state->network->plan->relaxation;
+    *r = (relaxation){.state = state,
+                      .constants = constants,
+                      .rows = &run->rows[state->network->relaxation_key[0]],
+                      .wall_rows = &run->rows[state->network->relaxation_key[1]],
+                      .count = state->hierarchy.set[ASCC_SET_FLUID].count,
+                      .inverse_support = (float)(state->hierarchy.scale.unit / constants->support)};
+    if (r->count > INT32_MAX)
+        return ascc_fail(tools->message, ASCC_ERROR_RANGE, "more than 2^31 particles to relax");
+    ascc_status status = ascc_wall_volumes_update(state->walls, tools, state->particles,
+                                                  constants->support / state->length_unit);
+    if (status == ASCC_OK)
+        status = ascc_pair_sum_open(&r->sum, run, ASCC_SET_FLUID, state->particles->mass, 4);
+    if (status != ASCC_OK)
+        return status;
+    if (!lend_volumes(r) || !lend_memory(r))
+        return ascc_fail(tools->message, ASCC_ERROR_MEMORY, "no memory for the relaxation");
+    ascc_workers_run(tools->workers, r->count, 4 * ROWS, find_places, r);
+    const size_t bad = atomic_load(&r->bad);
+    if (bad) {
+        const size_t row = ascc_hierarchy_host_row(&state->hierarchy, ASCC_SET_FLUID, bad - 1);
+        return ascc_fail(tools->message, ASCC_ERROR_RANGE,
+                         "fluid particle %" PRIu64
+                         " (row %zu): the network takes it too far to relax",
+                         state->particles->id[row], row);
+    }
+    ascc_workers_run(tools->workers, r->count, ROWS, look_around, r);
+    return ASCC_OK;
+}
+
+/* ---- Sweeps ---- */
+
+static void push_rows(void *data, size_t begin, size_t end, int32_t slot)
+{
+    (void)slot;
+    relaxation *r = data;
+    const ascc_gradients pairs = gradients(r);
+    r->state->tools.kernels->push(&pairs, begin, end, r->pressure, r->push, r->move);
+}
+
+static void relax_rows(void *data, size_t begin, size_t end, int32_t slot)
+{
+    (void)slot;
+    relaxation *r = data;
+    const ascc_gradients pairs = gradients(r);
+    r->state->tools.kernels->divergence(&pairs, begin, end, r->own, r->move, r->change);
+    for (size_t i = begin; i < end; i++) {
+        const float pressure =
+            r->pressure[i] + r->omega * (r->excess[i] + r->change[i]) * r->response[i];
+        r->pressure[i] = pressure > 0.0f ? pressure : 0.0f;
+    }
+}
+
+/* The first of all sweeps: nothing has moved yet. */
+static void begin_rows(void *data, size_t begin, size_t end, int32_t slot)
+{
+    (void)slot;
+    relaxation *r = data;
+    for (size_t i = begin; i < end; i++) {
+        const float pressure = r->omega * r->excess[i] * r->response[i];
+        r->change[i] = 0.0f;
+        r->pressure[i] = pressure > 0.0f ? pressure : 0.0f;
+    }
+}
+
+static void sweep(relaxation *r, int32_t sweeps)
+{
+    ascc_workers *workers = r->state->tools.workers;
+    for (int32_t k = 0; k < sweeps; k++) {
+        r->omega = (float)r->constants->omega[k < r->constants->sweeps ? k : 0];
+        if (k > 0) {
+            ascc_workers_run(workers, r->count, ROWS, push_rows, r);
+            ascc_workers_run(workers, r->count, ROWS, relax_rows, r);
+        } else {
+            ascc_workers_run(workers, r->count, 16 * ROWS, begin_rows, r);
+        }
+    }
+}
+
+/* ---- Impulses ---- */
+
+/* Unit vectors times what pairs that are too near lack, all in supports; 0 for the others. */
+static bool find_repulsion(const relaxation *r, const ascc_pairs *pairs, size_t count,
+                           float apart[3][ASCC_PAIR_BATCH])
+{
+    const float distance = r->repulsion, share = (float)(0.5 * r->constants->stiffness);
+    bool any = false;
+    for (size_t k = 0; k < count; k++)
+        any |= pairs->distance[k] < distance;
+    for (size_t k = 0; any && k < count; k++) {
+        const float lack = distance - pairs->distance[k];
+        const float size = lack > 0.0f ? share * lack : 0.0f;
+        apart[0][k] = size * pairs->x[k];
+        apart[1][k] = size * pairs->y[k];
+        apart[2][k] = size * pairs->z[k];
+    }
+    return any;
+}
+
+/* Corrections of row i by the pairs of a batch, in supports; no pair gives more than the limit, no wall more
+ * than its share of it: of walls twice as dense each has half. */
+static void corrections(const relaxation *r, size_t i, ascc_pair_batch *b, bool walls,
+                        float term[ASCC_PAIR_BATCH][4])
+{
+    float geometry[4][ASCC_PAIR_BATCH], apart[3][ASCC_PAIR_BATCH], sum[8];
+    const ascc_kernels *kernels = r->state->tools.kernels;
+    const ascc_pairs pairs = {
+        .x = geometry[0], .y = geometry[1], .z = geometry[2], .distance = geometry[3]};
+    const ascc_coordinates points =
+        coordinates(walls ? r->state->hierarchy.set[ASCC_SET_BOUNDARY].low : r->low);
+    const float limit = (float)(r->constants->limit / r->constants->support);
+    const float amount = (float)r->constants->amount;
+    kernels->geometry(&points, b->neighbor, b->count, r->low[0][i], r->low[1][i], r->low[2][i],
+                      r->inverse_support, ASCC_MAPPING_DIRECTION, &pairs);
+    const bool near = !walls && find_repulsion(r, &pairs, b->count, apart);
+    kernels->spline(&pairs, b->neighbor, b->count, amount, walls ? r->wall_volume : NULL, sum);
+    for (size_t k = 0; k < b->count; k++) {
+        const float p = r->pressure[i] + (walls ? 0.0f : r->pressure[b->neighbor[k]]);
+        float size = 0.0f;
+        for (int c = 0; c < 3; c++) {
+            term[k][c] = -(p * geometry[c][k] + (near ? apart[c][k] : 0.0f));
+            size += term[k][c] * term[k][c];
+        }
+        term[k][3] = 0.0f;
+        const float most = walls ? limit * (r->wall_volume[b->neighbor[k]] / amount) : limit;
+        if (size > most * most) {
+            const float share = most / sqrtf(size);
+            for (int c = 0; c < 3; c++)
+                term[k][c] *= share;
+        }
+    }
+}
+
+/* Quanta per kilogram and support of correction. */
+static double impulse_factor(const relaxation *r)
+{
+    const ascc_step_state *state = r->state;
+    return r->constants->support / state->length_unit / state->motion->time_step /
+           state->particles->quantum;
+}
+
+static void evaluate(ascc_pair_sum *sum, size_t i, ascc_pair_batch *b)
+{
+    const relaxation *r = sum->data;
+    const double f = impulse_factor(r), factor[4] = {f, f, f, 0.0};
+    float term[ASCC_PAIR_BATCH][4];
+    double mass[ASCC_PAIR_BATCH];
+    corrections(r, i, b, false, term);
+    mass[0] = sum->mass[i];
+    for (size_t k = 0; k < b->count && !sum->uniform; k++)
+        mass[k] = ascc_pair_mass(sum->mass[i], sum->mass[b->neighbor[k]]);
+    if (!r->state->tools.kernels->pair_impulses(term[0], factor, mass, !sum->uniform,
+                                                ASCC_IMPULSE_LIMIT, b->neighbor, b->count,
+                                                sum->sum + i * 4, sum->sum))
+        ascc_pair_sum_note_bad(sum, i);
+}
+
+static void evaluate_walls(ascc_pair_sum *sum, size_t i, ascc_pair_batch *b)
+{
+    const relaxation *r = sum->data;
+    const double factor = impulse_factor(r) * sum->mass[i];
+    float term[ASCC_PAIR_BATCH][4];
+    double impulse[3][ASCC_PAIR_BATCH];
+    if (r->pressure[i] == 0.0f)
+        return;
+    corrections(r, i, b, true, term);
+    for (int c = 0; c < 3; c++)
+        for (size_t k = 0; k < b->count; k++)
+            impulse[c][k] = factor * (double)term[k][c];
+    ascc_pair_sum_add_walls(sum, i, b, impulse);
+}
+
+/* Impulses of the pressure: of walls added to theirs, of the fluid into given[host's rows][dimension]. */
+static ascc_status apply(relaxation *r, int64_t *given)
+{
+    const ascc_impulses to = {given, r->state->impulses.wall};
+    uint64_t pairs;
+    r->sum.data = r;
+    r->sum.skip_coincident = false; /* where the network saw them; now they may be apart */
+    ascc_pair_sum_run(&r->sum, r->rows, evaluate);
+    ascc_pair_sum_run_walls(&r->sum, r->wall_rows, r->state->impulses.wall, evaluate_walls);
+    const size_t bad = atomic_load(&r->sum.bad_row);
+    if (bad)
+        return ascc_fail(r->state->tools.message, ASCC_ERROR_RANGE,
+                         "the relaxation gives fluid row %zu an impulse too large to hold",
+                         ascc_hierarchy_host_row(&r->state->hierarchy, ASCC_SET_FLUID, bad - 1));
+    return ascc_pair_sum_give(&r->sum, r->pressure, 1, &to, &pairs);
+}
+
+/* ---- The stages ---- */
+
+/* Mean and largest of what is left of the excess as the last sweep began. */
+static void measure_rows(void *data, size_t begin, size_t end, int32_t slot)
+{
+    (void)slot;
+    relaxation *r = data;
+    uint64_t sum = 0, largest = 0;
+    for (size_t i = begin; i < end; i++) {
+        const float c = r->excess[i] + r->change[i];
+        const uint64_t units = c > 0.0f ? (uint64_t)((double)c / COMPRESSION_UNIT) : 0;
+        sum += units;
+        largest = units > largest ? units : largest;
+    }
+    atomic_fetch_add_explicit(&r->compression, sum, memory_order_relaxed);
+    uint_least64_t seen = atomic_load_explicit(&r->largest, memory_order_relaxed);
+    while (seen < largest &&
+           !atomic_compare_exchange_weak_explicit(&r->largest, &seen, largest, memory_order_relaxed,
+                                                  memory_order_relaxed))
+        ;
+}
+
+static void measure(relaxation *r, ascc_compression *to)
+{
+    atomic_store(&r->compression, 0);
+    atomic_store(&r->largest, 0);
+    ascc_workers_run(r->state->tools.workers, r->count, 16 * ROWS, measure_rows, r);
+    to->mean = COMPRESSION_UNIT * (double)atomic_load(&r->compression) / (double)r->count;
+    to->largest = COMPRESSION_UNIT * (double)atomic_load(&r->largest);
+}
+
+/* Adds what was given to impulses; false where that overflows. */
+static bool add_impulses(int64_t *to, const int64_t *given, size_t count)
+{
+    bool good = true;
+    for (size_t k = 0; k < count; k++)
+        good &= !__builtin_add_overflow(to[k], given[k], &to[k]);
+    return good;
+}
+
+static int64_t *lend_given(ascc_step_state *state)
+{
+    const ascc_particles *p = state->particles;
+    return ascc_arena_lend(state->tools.arena, p->fluid_count * (size_t)p->dimension,
+                           sizeof(int64_t));
+}
+
+static ascc_status no_memory(const ascc_step_state *state)
+{
+    return ascc_fail(state->tools.message, ASCC_ERROR_MEMORY, "no memory for the relaxation");
+}
+
+static ascc_status relax(ascc_step_state *state, relaxation *r, int64_t *given)
+{
+    const ascc_particles *p = state->particles;
+    ascc_step_statistics *s = state->statistics;
+    ascc_status status = given ? open_relaxation(r, state) : no_memory(state);
+    if (status != ASCC_OK)
+        return status;
+    r->repulsion = (float)(r->constants->repulsion / r->constants->support);
+    memset(r->change, 0, r->count * sizeof *r->change);
+    measure(r, &s->compression_before);
+    sweep(r, r->constants->sweeps);
+    measure(r, &s->compression_after);
+    s->sweeps = (uint64_t)r->constants->sweeps;
+    status = apply(r, given);
+    if (status == ASCC_OK &&
+        !add_impulses(state->impulses.fluid, given, p->fluid_count * (size_t)p->dimension))
+        status = ascc_fail(state->tools.message, ASCC_ERROR_RANGE,
+                           "the relaxation gives a particle an impulse too large to hold");
+    return status == ASCC_OK ? ascc_stage_advance(state) : status;
+}
+
+ascc_status ascc_stage_relaxation(ascc_step_state *state)
+{
+    if (!state->network->plan->relaxation.sweeps || !state->particles->fluid_count)
+        return ASCC_OK;
+    const ascc_arena_mark mark = ascc_arena_mark_of(state->tools.arena);
+    relaxation r;
+    const ascc_status status = relax(state, &r, lend_given(state));
+    ascc_arena_return(state->tools.arena, mark);
+    ascc_stage_lap(state, "relaxation");
+    return status;
+}
+
+/* Velocities as they are now, in supports a step. */
+static void find_velocities(relaxation *r)
+{
+    const ascc_particles *p = r->state->particles;
+    const ascc_hierarchy *h = &r->state->hierarchy;
+    const size_t d = (size_t)p->dimension;
+    const double unit =
+        r->state->motion->time_step * p->quantum * r->state->length_unit / r->constants->support;
+    for (size_t i = 0; i < r->count; i++) {
+        const size_t row = ascc_hierarchy_host_row(h, ASCC_SET_FLUID, i);
+        for (size_t c = 0; c < 3; c++)
+            r->move[c][i] =
+                c < d
+                    ? (float)((double)r->state->advance.momentum[row * d + c] * unit / p->mass[row])
+                    : 0.0f;
+    }
+}
+
+static void diverge_rows(void *data, size_t begin, size_t end, int32_t slot)
+{
+    (void)slot;
+    relaxation *r = data;
+    const ascc_gradients pairs = gradients(r);
+    for (size_t i = begin; i < end; i++)
+        if (r->excess[i] < -SURFACE)
+            r->response[i] = 0.0f;
+    r->state->tools.kernels->divergence(&pairs, begin, end, r->own, r->move, r->excess);
+}
+
+static ascc_status slow_down(ascc_step_state *state, relaxation *r, int64_t *given)
+{
+    const ascc_particles *p = state->particles;
+    ascc_status status = given ? open_relaxation(r, state) : no_memory(state);
+    if (status != ASCC_OK)
+        return status;
+    find_velocities(r);
+    ascc_workers_run(state->tools.workers, r->count, ROWS, diverge_rows, r);
+    sweep(r, r->constants->divergence_sweeps);
+    status = apply(r, given);
+    for (size_t k = 0; status == ASCC_OK && k < p->fluid_count * (size_t)p->dimension; k++)
+        if (__builtin_add_overflow(state->advance.momentum[k], given[k],
+                                   &state->advance.momentum[k]) ||
+            state->advance.momentum[k] > ASCC_MOMENTUM_LIMIT ||
+            state->advance.momentum[k] < -ASCC_MOMENTUM_LIMIT)
+            return ascc_fail(state->tools.message, ASCC_ERROR_RANGE,
+                             "fluid particle %" PRIu64 ": momentum too large to hold",
+                             p->id[k / (size_t)p->dimension]);
+    return status;
+}
+
+ascc_status ascc_stage_divergence(ascc_step_state *state)
+{
+    if (!state->network->plan->relaxation.divergence_sweeps || !state->particles->fluid_count)
+        return ASCC_OK;
+    const ascc_arena_mark mark = ascc_arena_mark_of(state->tools.arena);
+    relaxation r;
+    const ascc_status status = slow_down(state, &r, lend_given(state));
+    ascc_arena_return(state->tools.arena, mark);
+    ascc_stage_lap(state, "divergence");
+    return status;
+}

@@ -1,0 +1,141 @@
+/* Akinci volumes of wall points. SPDX-License-Identifier: MIT */
+#include "wall_volumes.h"
+
+#include <string.h>
+
+#define MAX_NEIGHBORS 65536
+
+static bool are_known(const ascc_wall_volumes *walls, const ascc_particles *p, double support)
+{
+    const size_t numbers = p->boundary_count * (size_t)p->dimension;
+    return walls->count == p->boundary_count && walls->support == support &&
+           memcmp(walls->position, p->wall_position, numbers * sizeof *walls->position) == 0;
+}
+
+/* The cubic spline of kernels.h's `spline`, of a squared distance in supports. */
+static double spline_at(double square)
+{
+    const double q = sqrt(square), far = 1.0 - q, near = 0.5 - q;
+    if (far <= 0.0)
+        return 0.0;
+    return 2.0 * far * far * far - (near > 0.0 ? 8.0 * near * near * near : 0.0);
+}
+
+typedef struct volumes_job {
+    const ascc_rows *rows;
+    const uint32_t *order; /* host's row of a point */
+    float *volume;
+} volumes_job;
+
+static void find_volumes(void *data, size_t begin, size_t end, int32_t slot)
+{
+    (void)slot;
+    const volumes_job *job = data;
+    const ascc_rows *rows = job->rows;
+    const double inverse = 1.0 / rows->radius;
+    for (size_t i = begin; i < end; i++) {
+        double sum = 0.0;
+        for (uint32_t k = 0; k < rows->count[i]; k++) {
+            const uint32_t j = rows->neighbor[rows->start[i] + k];
+            double square = 0.0;
+            for (int c = 0; c < 3; c++) {
+                const double d = inverse * (double)(int32_t)((uint32_t)rows->source->low[c][j] -
+                                                             (uint32_t)rows->query->low[c][i]);
+                square += d * d;
+            }
+            sum += spline_at(square);
+        }
+        job->volume[job->order[i]] = (float)(1.0 / sum); /* itself is 1 */
+    }
+}
+
+/* The walls as points in the order of cells, so that sums do not depend on the host's order. */
+static ascc_status sort_walls(const ascc_search_tools *tools, const ascc_particles *p,
+                              const ascc_scale *scale, double radius, ascc_points *points,
+                              uint32_t *order, ascc_extent *extent)
+{
+    const size_t d = (size_t)p->dimension, count = p->boundary_count;
+    ascc_points raw;
+    if (!ascc_points_take(&raw, tools->arena, count) ||
+        !ascc_points_take(points, tools->arena, count))
+        return ascc_fail(tools->message, ASCC_ERROR_MEMORY, "no memory for %zu walls", count);
+    for (size_t i = 0; i < count; i++) {
+        int64_t at[3] = {0};
+        for (size_t c = 0; c < d; c++)
+            if (!ascc_scale_apply(scale, p->wall_position[i * d + c], &at[c]))
+                return ascc_fail(tools->message, ASCC_ERROR_RANGE,
+                                 "boundary row %zu is too far from the origin for the relaxation",
+                                 i);
+        ascc_points_set(&raw, i, at);
+    }
+    *extent = ascc_extent_of(&raw, tools->workers);
+    const ascc_status status =
+        ascc_points_order(tools, &raw, extent, ascc_grid_cell(radius), order);
+    for (size_t i = 0; status == ASCC_OK && i < count; i++) {
+        const int64_t at[3] = {raw.position[0][order[i]], raw.position[1][order[i]],
+                               raw.position[2][order[i]]};
+        ascc_points_set(points, i, at);
+    }
+    return status;
+}
+
+static ascc_status make_volumes(float *volume, const ascc_search_tools *tools,
+                                const ascc_particles *p, double support)
+{
+    const ascc_scale scale = ascc_scale_for_radius(support);
+    ascc_points points;
+    ascc_extent extent;
+    ascc_grid grid;
+    ascc_rows rows = {.query = &points,
+                      .source = &points,
+                      .query_grid = &grid,
+                      .source_grid = &grid,
+                      .radius = support * scale.inverse,
+                      .same = true,
+                      .max_neighbors = MAX_NEIGHBORS};
+    uint32_t *order = ascc_arena_take(tools->arena, p->boundary_count, sizeof *order);
+    if (!order)
+        return ascc_fail(tools->message, ASCC_ERROR_MEMORY, "no memory for %zu walls",
+                         p->boundary_count);
+    ascc_status status = sort_walls(tools, p, &scale, rows.radius, &points, order, &extent);
+    if (status == ASCC_OK)
+        status = ascc_grid_build(&grid, tools, &points, &extent, rows.radius, true);
+    if (status == ASCC_OK)
+        status = ascc_rows_open(&rows, tools, 0);
+    if (status == ASCC_OK)
+        status = ascc_rows_make(&rows, tools, NULL);
+    volumes_job job = {&rows, order, volume};
+    if (status == ASCC_OK)
+        ascc_workers_run(tools->workers, p->boundary_count, 1024, find_volumes, &job);
+    return status;
+}
+
+ascc_status ascc_wall_volumes_update(ascc_wall_volumes *walls, const ascc_search_tools *tools,
+                                     const ascc_particles *p, double support)
+{
+    const size_t count = p->boundary_count, numbers = count * (size_t)p->dimension;
+    if (count == 0 || are_known(walls, p, support))
+        return ASCC_OK;
+    walls->count = 0;
+    if (!ascc_grow(walls->allocator, (void **)&walls->volume, &walls->volume_capacity, count,
+                   sizeof *walls->volume) ||
+        !ascc_grow(walls->allocator, (void **)&walls->position, &walls->position_capacity, numbers,
+                   sizeof *walls->position))
+        return ascc_fail(tools->message, ASCC_ERROR_MEMORY, "no memory for %zu walls", count);
+    const ascc_status status = make_volumes(walls->volume, tools, p, support);
+    if (status != ASCC_OK)
+        return status;
+    memcpy(walls->position, p->wall_position, numbers * sizeof *walls->position);
+    walls->count = count;
+    walls->support = support;
+    return ASCC_OK;
+}
+
+void ascc_wall_volumes_close(ascc_wall_volumes *walls)
+{
+    if (!walls->allocator)
+        return;
+    ascc_release(walls->allocator, walls->volume, walls->volume_capacity, sizeof *walls->volume);
+    ascc_release(walls->allocator, walls->position, walls->position_capacity,
+                 sizeof *walls->position);
+}

@@ -1,0 +1,24 @@
+/* What wall points stand for: each a volume that makes the density of walls count once, however dense they
+ * are (Akinci et al. 2012). SPDX-License-Identifier: MIT */
+#ifndef ASCC_WALL_VOLUMES_H
+#define ASCC_WALL_VOLUMES_H
+
+#include "points/neighbors.h"
+#include "points/particles.h"
+
+/* Kept from step to step, made anew when walls are others. */
+typedef struct ascc_wall_volumes {
+    const ascc_allocator *allocator;
+    float *volume;    /* [count] of the host's boundary rows, times the spline's middle */
+    double *position; /* [count][dimension] that they were made for */
+    size_t count, volume_capacity, position_capacity;
+    double support; /* likewise, in the host's unit */
+} ascc_wall_volumes;
+
+/* Volumes of the set's walls: 1 / sum of w over all walls within the support. errors: MEMORY, RANGE,
+ * LIMIT. */
+ascc_status ascc_wall_volumes_update(ascc_wall_volumes *walls, const ascc_search_tools *tools,
+                                     const ascc_particles *particles, double support);
+void ascc_wall_volumes_close(ascc_wall_volumes *walls);
+
+#endif
