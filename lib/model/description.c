@@ -261,7 +261,7 @@ static void read_output(ascc_plan_builder *builder, ascc_reader *reader)
     const char *name[ASCC_MAX_TENSORS] = {NULL};
     ascc_output output = {.half_axis = -1};
     ascc_reader_where(reader, "network");
-    if (builder->plan.relaxation.sweeps && !ascc_reader_has(reader, 0, "output")) {
+    if (builder->plan.relaxation.pressure.count && !ascc_reader_has(reader, 0, "output")) {
         output.term.operation = find_operation("none");
         if (reader->status == ASCC_OK)
             reader->status = ascc_plan_set_output(builder, &output, name);

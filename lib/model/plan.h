@@ -124,17 +124,22 @@ static inline double ascc_output_limit(const ascc_output *output)
 /* A relaxation shares the neighbour list of a term that looks farther, by this factor at most. */
 #define ASCC_LONGER 2.0
 
+/* Jacobi sweeps of a relaxation. */
+typedef struct ascc_sweeps {
+    int32_t count;
+    double omega[ASCC_MAX_SWEEPS]; /* of each: what its correction is multiplied with */
+} ascc_sweeps;
+
 /* Pressure from a few sweeps after the network, and one convolution of it (docs/method.md). */
 typedef struct ascc_relaxation {
-    int32_t sweeps; /* 0 = there is none */
-    int32_t divergence_sweeps;
-    double omega[ASCC_MAX_SWEEPS]; /* of each sweep */
-    double epsilon;                /* of the lattice's response, added to each particle's own */
-    double support;                /* of the cubic spline, m */
-    double rest_volume;            /* of a particle, m^dimension */
-    double limit;                  /* the greatest correction of a position by one pair, m */
-    double repulsion, stiffness;   /* pairs nearer than this, m, part by this share of the lack */
-    double contact;                /* as of an output, for a model that has none there; m */
+    ascc_sweeps pressure; /* none = there is no relaxation */
+    ascc_sweeps divergence;
+    double epsilon;              /* of the lattice's response, added to each particle's own */
+    double support;              /* of the cubic spline, m */
+    double rest_volume;          /* of a particle, m^dimension */
+    double limit;                /* the greatest correction of a position by one pair, m */
+    double repulsion, stiffness; /* pairs nearer than this, m, part by this share of the lack */
+    double contact;              /* as of an output, for a model that has none there; m */
     /* What follows: */
     double reach;            /* of the neighbour lists, m */
     double amount;           /* the spline's middle times rest_volume */

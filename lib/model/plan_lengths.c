@@ -27,7 +27,7 @@ void ascc_plan_radii(const ascc_plan *plan, double *smallest, double *largest)
         *largest = fmax(*largest, radius);
     }
     *largest = fmax(*largest, fmax(plan->output.walls.radius, plan->relaxation.reach));
-    if (plan->relaxation.sweeps && *smallest > ASCC_LONGER * plan->relaxation.reach)
+    if (plan->relaxation.pressure.count && *smallest > ASCC_LONGER * plan->relaxation.reach)
         *smallest = plan->relaxation.reach;
     if (*largest == 0.0) /* a network of dense layers: any scale will do */
         *smallest = *largest = plan->spacing > 0.0 ? plan->spacing : 1.0;
@@ -63,7 +63,7 @@ static double sampling_reach(const ascc_plan *plan, int32_t set)
 static double relaxation_reach(const ascc_plan *plan)
 {
     const ascc_relaxation *r = &plan->relaxation;
-    return 2.0 * r->support * (r->sweeps + r->divergence_sweeps);
+    return 2.0 * r->support * (r->pressure.count + r->divergence.count);
 }
 
 double ascc_plan_receptive_radius(const ascc_plan *plan)
@@ -87,7 +87,7 @@ double ascc_plan_receptive_radius(const ascc_plan *plan)
 int32_t ascc_plan_neighbor_limit(const ascc_plan *plan)
 {
     int32_t most = 0;
-    if (plan->relaxation.sweeps)
+    if (plan->relaxation.pressure.count)
         return 0;
     for (int32_t t = 0; t <= plan->term_count; t++) {
         ascc_list_key key[ASCC_MAX_LISTS];

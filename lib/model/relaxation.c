@@ -59,35 +59,41 @@ static void find_constants(ascc_reader *reader, const ascc_plan *plan, ascc_rela
     r->reach = r->support + MARGIN * plan->spacing;
 }
 
-/* What the sweeps leave of an excess is their product of 1 - omega lambda, for every eigenvalue lambda. */
-static void check_omega(ascc_reader *reader, const ascc_relaxation *r)
+/* What sweeps leave of an excess is the product of their 1 - omega lambda, for every eigenvalue lambda. */
+static bool settles(const ascc_sweeps *sweeps)
 {
     enum { STEPS = 400 };
     for (int i = 0; i <= STEPS; i++) {
         const double eigenvalue = LARGEST_EIGENVALUE * i / STEPS;
         double left = 1.0;
-        for (int32_t k = 0; k < r->sweeps; k++)
-            left *= 1.0 - r->omega[k] * eigenvalue;
-        if (!(fabs(left) <= 1.0 + 1e-9)) {
-            ascc_reader_fail(reader,
-                             "sweeps of this 'omega' would not settle: 0.5 is the most of one "
-                             "number for all");
-            return;
-        }
+        for (int32_t k = 0; k < sweeps->count; k++)
+            left *= 1.0 - sweeps->omega[k] * eigenvalue;
+        if (!(fabs(left) <= 1.0 + 1e-9))
+            return false;
     }
+    return true;
 }
 
-static void read_omega(ascc_reader *reader, uint32_t object, ascc_relaxation *r)
+static void read_sweeps(ascc_reader *reader, uint32_t object, const char *key, ascc_sweeps *sweeps)
 {
-    const ascc_json *json = reader->json;
-    for (uint32_t i = ascc_json_first(json, object); i != 0; i = json->value[i].next)
-        if (strcmp(json->value[i].name, "omega") == 0 && json->value[i].kind == ASCC_JSON_ARRAY) {
-            ascc_reader_numbers(reader, object, "omega", r->sweeps, 1e-3, 4.0, r->omega);
-            return;
-        }
-    const double omega = ascc_reader_number(reader, object, "omega", 1e-3, 4.0);
-    for (int32_t k = 0; k < r->sweeps; k++)
-        r->omega[k] = omega;
+    const uint32_t list = ascc_reader_array(reader, object, key);
+    int32_t count = 0;
+    if (reader->status != ASCC_OK)
+        return;
+    for (uint32_t i = ascc_json_first(reader->json, list); i != 0; i = reader->json->value[i].next)
+        count++;
+    if (count < 1 || count > ASCC_MAX_SWEEPS) {
+        ascc_reader_fail(reader, "'%s' must have a number for each sweep, 1 to %d of them", key,
+                         ASCC_MAX_SWEEPS);
+        return;
+    }
+    ascc_reader_numbers(reader, object, key, count, 1e-3, 100.0, sweeps->omega);
+    sweeps->count = count;
+    if (reader->status == ASCC_OK && !settles(sweeps))
+        ascc_reader_fail(reader,
+                         "sweeps of these numbers '%s' would not settle; if all are the same, 0.5 "
+                         "is the most",
+                         key);
 }
 
 void ascc_relaxation_read(ascc_reader *reader, uint32_t object, ascc_plan *plan)
@@ -99,13 +105,11 @@ void ascc_relaxation_read(ascc_reader *reader, uint32_t object, ascc_plan *plan)
     ascc_reader_where(reader, "relaxation");
     r.support = ascc_reader_number(reader, o, "support", ASCC_PLAN_MIN, ASCC_PLAN_MAX);
     r.rest_volume = ascc_reader_number(reader, o, "rest_volume", 1e-45, 1e45);
-    r.sweeps = ascc_reader_integer(reader, o, "sweeps", 1, ASCC_MAX_SWEEPS);
-    if (reader->status == ASCC_OK)
-        read_omega(reader, o, &r);
+    read_sweeps(reader, o, "omega", &r.pressure);
     r.epsilon = ascc_reader_number(reader, o, "epsilon", 1e-3, 10.0);
     r.limit = ascc_reader_number(reader, o, "limit", 1e-6 * r.support, r.support);
     if (ascc_reader_has(reader, o, "divergence"))
-        r.divergence_sweeps = ascc_reader_integer(reader, o, "divergence", 0, ASCC_MAX_SWEEPS);
+        read_sweeps(reader, o, "divergence", &r.divergence);
     if (ascc_reader_has(reader, o, "contact"))
         r.contact = ascc_reader_number(reader, o, "contact", 0.0, r.support);
     if (ascc_reader_has(reader, o, "repulsion")) {
@@ -119,8 +123,6 @@ void ascc_relaxation_read(ascc_reader *reader, uint32_t object, ascc_plan *plan)
     ascc_reader_end(reader, o);
     if (reader->status == ASCC_OK)
         find_constants(reader, plan, &r);
-    if (reader->status == ASCC_OK)
-        check_omega(reader, &r);
     ascc_reader_where(reader, "network");
     plan->relaxation = r;
 }

@@ -103,7 +103,7 @@ ascc_status ascc_network_create(ascc_network *network, const ascc_allocator *all
     prepare_term(network, plan->term_count, ascc_network_set(network, plan->output.term.source));
     for (int i = 0; i < 2; i++)
         network->relaxation_key[i] =
-            plan->relaxation.sweeps
+            plan->relaxation.pressure.count
                 ? relaxation_key(network, i == 0 ? ASCC_SET_FLUID : ASCC_SET_BOUNDARY)
                 : -1;
     return ASCC_OK;

@@ -317,11 +317,11 @@ static void begin_rows(void *data, size_t begin, size_t end, int32_t slot)
     }
 }
 
-static void sweep(relaxation *r, int32_t sweeps)
+static void sweep(relaxation *r, const ascc_sweeps *sweeps)
 {
     ascc_workers *workers = r->state->tools.workers;
-    for (int32_t k = 0; k < sweeps; k++) {
-        r->omega = (float)r->constants->omega[k < r->constants->sweeps ? k : 0];
+    for (int32_t k = 0; k < sweeps->count; k++) {
+        r->omega = (float)sweeps->omega[k];
         if (k > 0) {
             ascc_workers_run(workers, r->count, ROWS, push_rows, r);
             ascc_workers_run(workers, r->count, ROWS, relax_rows, r);
@@ -503,9 +503,9 @@ static ascc_status relax(ascc_step_state *state, relaxation *r, int64_t *given)
     r->repulsion = (float)(r->constants->repulsion / r->constants->support);
     memset(r->change, 0, r->count * sizeof *r->change);
     measure(r, &s->compression_before);
-    sweep(r, r->constants->sweeps);
+    sweep(r, &r->constants->pressure);
     measure(r, &s->compression_after);
-    s->sweeps = (uint64_t)r->constants->sweeps;
+    s->sweeps = (uint64_t)r->constants->pressure.count;
     status = apply(r, given);
     if (status == ASCC_OK &&
         !add_impulses(state->impulses.fluid, given, p->fluid_count * (size_t)p->dimension))
@@ -516,7 +516,7 @@ static ascc_status relax(ascc_step_state *state, relaxation *r, int64_t *given)
 
 ascc_status ascc_stage_relaxation(ascc_step_state *state)
 {
-    if (!state->network->plan->relaxation.sweeps || !state->particles->fluid_count)
+    if (!state->network->plan->relaxation.pressure.count || !state->particles->fluid_count)
         return ASCC_OK;
     const ascc_arena_mark mark = ascc_arena_mark_of(state->tools.arena);
     relaxation r;
@@ -563,7 +563,7 @@ static ascc_status slow_down(ascc_step_state *state, relaxation *r, int64_t *giv
         return status;
     find_velocities(r);
     ascc_workers_run(state->tools.workers, r->count, ROWS, diverge_rows, r);
-    sweep(r, r->constants->divergence_sweeps);
+    sweep(r, &r->constants->divergence);
     status = apply(r, given);
     for (size_t k = 0; status == ASCC_OK && k < p->fluid_count * (size_t)p->dimension; k++)
         if (__builtin_add_overflow(state->advance.momentum[k], given[k],
@@ -578,7 +578,7 @@ static ascc_status slow_down(ascc_step_state *state, relaxation *r, int64_t *giv
 
 ascc_status ascc_stage_divergence(ascc_step_state *state)
 {
-    if (!state->network->plan->relaxation.divergence_sweeps || !state->particles->fluid_count)
+    if (!state->network->plan->relaxation.divergence.count || !state->particles->fluid_count)
         return ASCC_OK;
     const ascc_arena_mark mark = ascc_arena_mark_of(state->tools.arena);
     relaxation r;
