@@ -10,6 +10,7 @@ int ascc_command_show(int argc, char **argv);
 int ascc_command_generate(int argc, char **argv);
 int ascc_command_lint(int argc, char **argv);
 int ascc_command_eval(int argc, char **argv);
+int ascc_command_relax(int argc, char **argv);
 int ascc_command_train(int argc, char **argv);
 int ascc_command_convert(int argc, char **argv);
 

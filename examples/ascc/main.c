@@ -17,6 +17,7 @@ static const struct {
     {"generate", "make sequences with the reference solver", ascc_command_generate},
     {"lint", "check sequences for spikes, escapes and clumps", ascc_command_lint},
     {"eval", "measure a method on true sequences", ascc_command_eval},
+    {"relax", "give a model file a relaxation", ascc_command_relax},
     {"train", "train a network over rollouts", ascc_command_train},
     {"convert", "make a model file of a published network", ascc_command_convert},
 };
