@@ -506,6 +506,37 @@ static void momentum_is_conserved_to_the_bit_with_walls_and_unequal_masses(void 
         }
 }
 
+static void along_the_lines_before_a_step_angular_momentum_is_conserved(void **state)
+{
+    (void)state;
+    for (int turned = 0; turned < 2; turned++)
+        for (int d = 2; d <= 3; d++) {
+            static double x[300 * 3], v[300 * 3], m[300];
+            dice r = {99};
+            world w;
+            open_pbf(&w, d, 0.0, 0,
+                     turned ? ",\"divergence\":[0.5,0.5],\"direction\":\"current\""
+                            : ",\"divergence\":[0.5,0.5]");
+            ascc_model_info info = {.size = sizeof info};
+            check_good(&w, ascc_model_get_info(w.model, &info));
+            assert_int_equal(info.conserves_angular_momentum, turned);
+            const size_t n = crowd(&r, d, 200, 1.5, x, v, m, true);
+            add_fluid(&w, n, x, v, m);
+            ascc_measures before = {.size = sizeof before}, after = before;
+            check_good(&w, ascc_particles_measure(w.particles, &before));
+            check_good(&w, ascc_step_run(w.step, w.particles, NULL, 20));
+            check_good(&w, ascc_particles_measure(w.particles, &after));
+            /* what is left is rounding: of impulses to quanta, of terms to floats */
+            const double wrong =
+                fabs(after.angular_momentum[2] - before.angular_momentum[2]) / after.angular_scale;
+            if (turned)
+                assert_true(wrong < 1e-6);
+            else
+                assert_true(wrong > 1e-5);
+            close_world(&w);
+        }
+}
+
 static void a_snapshot_holds_all_that_a_step_goes_on_from(void **state)
 {
     (void)state;
@@ -883,6 +914,7 @@ int main(void)
         cmocka_unit_test(unequal_masses_move_as_the_oracle_says),
         cmocka_unit_test(the_same_bits_on_every_cpu_for_any_threads_and_order),
         cmocka_unit_test(momentum_is_conserved_to_the_bit_with_walls_and_unequal_masses),
+        cmocka_unit_test(along_the_lines_before_a_step_angular_momentum_is_conserved),
         cmocka_unit_test(a_snapshot_holds_all_that_a_step_goes_on_from),
         cmocka_unit_test(a_steady_step_allocates_nothing_even_with_moving_walls),
         cmocka_unit_test(without_memory_a_step_fails_and_changes_nothing),

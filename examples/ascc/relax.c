@@ -24,7 +24,7 @@ typedef struct relax {
     const char *model, *output, *name;
     int32_t dimension; /* of a new one */
     double spacing, time_step;
-    bool none;
+    bool none, current;
     double omega[SWEEPS], divergence[SWEEPS];
     int omega_count, divergence_count;
     /* Lengths in spacings, volume in spacings^dimension. */
@@ -48,6 +48,8 @@ static const char help[] =
     "  --repulsion R         pairs nearer than this part (0.25; 0 = none)\n"
     "  --stiffness S         by this share of what they lack (0.5)\n"
     "  --contact C           with --new: how near the fluid comes to walls (0.4)\n"
+    "  --current             corrections lie along lines before the step: angular momentum is "
+    "conserved\n"
     "  --name NAME           of the model\n"
     "  --none                takes a relaxation away\n";
 
@@ -118,6 +120,8 @@ static bool read_arguments(relax *r, int argc, char **argv)
     for (int i = 0; i < argc; i++) {
         if (strcmp(argv[i], "--none") == 0) {
             r->none = true;
+        } else if (strcmp(argv[i], "--current") == 0) {
+            r->current = true;
         } else if (argv[i][0] != '-' && !r->model) {
             r->model = argv[i];
         } else if (i + 1 == argc || !read_option(r, argv[i], argv[i + 1])) {
@@ -161,6 +165,8 @@ static json_t *relaxation_of(const relax *r, int32_t dimension, double spacing)
         json_object_set_new(
             o, "repulsion",
             json_pack("{s:f,s:f}", "distance", r->repulsion * spacing, "stiffness", r->stiffness));
+    if (r->current)
+        json_object_set_new(o, "direction", json_string("current"));
     if (r->dimension && r->contact > 0.0)
         json_object_set_new(o, "contact", json_real(r->contact * spacing));
     return o;

@@ -140,6 +140,8 @@ typedef struct ascc_relaxation {
     double limit;                /* the greatest correction of a position by one pair, m */
     double repulsion, stiffness; /* pairs nearer than this, m, part by this share of the lack */
     double contact;              /* as of an output, for a model that has none there; m */
+    int32_t current_direction;   /* corrections are turned to the lines before the step */
+    int32_t reserved;
     /* What follows: */
     double reach;            /* of the neighbour lists, m */
     double amount;           /* the spline's middle times rest_volume */

@@ -98,6 +98,7 @@ static void read_sweeps(ascc_reader *reader, uint32_t object, const char *key, a
 
 void ascc_relaxation_read(ascc_reader *reader, uint32_t object, ascc_plan *plan)
 {
+    static const char *const directions[] = {"current"};
     if (!ascc_reader_has(reader, object, "relaxation"))
         return;
     const uint32_t o = ascc_reader_object(reader, object, "relaxation");
@@ -110,6 +111,8 @@ void ascc_relaxation_read(ascc_reader *reader, uint32_t object, ascc_plan *plan)
     r.limit = ascc_reader_number(reader, o, "limit", 1e-6 * r.support, r.support);
     if (ascc_reader_has(reader, o, "divergence"))
         read_sweeps(reader, o, "divergence", &r.divergence);
+    if (ascc_reader_has(reader, o, "direction"))
+        r.current_direction = 1 + ascc_reader_choice(reader, o, "direction", directions, 1);
     if (ascc_reader_has(reader, o, "contact"))
         r.contact = ascc_reader_number(reader, o, "contact", 0.0, r.support);
     if (ascc_reader_has(reader, o, "repulsion")) {

@@ -16,7 +16,8 @@ static ascc_status check(ascc_plan_builder *builder, const ascc_layer *layer,
 {
     (void)layer;
     (void)name;
-    builder->plan.output.conserves = builder->plan.output.central = 1;
+    ascc_output *output = &builder->plan.output;
+    output->conserves = output->central = output->current_direction = 1;
     entry->term.outputs = builder->plan.dimension;
     return ASCC_OK;
 }

@@ -7,6 +7,9 @@
 /* Coarse points beyond those of a full lattice: surfaces, and voxels that only a corner reaches. */
 #define SURFACE 1.4
 
+/* Of a wall within a relaxation's support: points in one layer, 0.65 spacings apart. */
+#define WALL_NEIGHBORS 32.0
+
 /* Bytes of one point: three 64-bit positions and their low words. */
 #define POINT_BYTES 36.0
 /* A point that is sorted: key and row, twice. */
@@ -143,6 +146,19 @@ static double hierarchy_bytes(const ascc_plan *plan, double fluid, double bounda
     return bytes + all * plan->dimension * 8.0;
 }
 
+/* Lent for a relaxation: numbers and pairs of each row, its impulses; and its walls as points with rows. */
+static double relaxation_bytes(const ascc_network *network, double fluid, double boundary)
+{
+    const ascc_plan *plan = network->plan;
+    if (!plan->relaxation.pressure.count)
+        return 0.0;
+    const ascc_list_key key = {
+        .query = ASCC_SET_FLUID, .source = ASCC_SET_FLUID, .radius = plan->relaxation.reach};
+    const double walls = 2.0 * POINT_BYTES + 4.0 + SORT_BYTES + 4.0 * 1.125 * WALL_NEIGHBORS;
+    return fluid * (100.0 + 20.0 * (row_length(plan, &key) + 7.0) + 41.0 + 8.0 * plan->dimension) +
+           boundary * (4.0 + walls);
+}
+
 size_t ascc_estimate_scratch(const ascc_network *network, size_t fluid, size_t boundary,
                              int32_t threads)
 {
@@ -158,7 +174,7 @@ size_t ascc_estimate_scratch(const ascc_network *network, size_t fluid, size_t b
     const double search = search_bytes(network, f, b);
     const double forward =
         features + all * 4.0 + (double)threads * layer_bytes(plan, 1.5 * longest);
-    const double last = all * output_bytes(plan);
+    const double last = fmax(all * output_bytes(plan), relaxation_bytes(network, f, b));
     double bytes = fmax(features + hierarchy_bytes(plan, f, b),
                         search + value_bytes(network, f, b) + fmax(forward, last));
     bytes = 1.125 * (points + bytes) + 64e3; /* what a block has more; small things */

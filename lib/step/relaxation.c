@@ -41,7 +41,8 @@ typedef struct relaxation {
     float *own[3];  /* sum of g, walls included */
     float *push[3]; /* the same by weight */
     float *excess, *response, *pressure, *change, *move[3];
-    float *scratch; /* [slots][4][room] */
+    const double *place; /* [count][3] before the step, if corrections lie along those lines */
+    float *scratch;      /* [slots][4][room] */
     size_t room;
     float omega;     /* of the sweep under way */
     float repulsion; /* below this distance, in supports */
@@ -351,6 +352,23 @@ static bool find_repulsion(const relaxation *r, const ascc_pairs *pairs, size_t 
     return any;
 }
 
+/* Turned to lie along the lines between the places: no torque about these. */
+static void turn(const relaxation *r, size_t i, const ascc_pair_batch *b,
+                 float term[ASCC_PAIR_BATCH][4])
+{
+    for (size_t k = 0; k < b->count; k++) {
+        const double *here = r->place + i * 3, *there = r->place + (size_t)b->neighbor[k] * 3;
+        double line[3], square = 0.0, along = 0.0;
+        for (int c = 0; c < 3; c++) {
+            line[c] = there[c] - here[c];
+            square += line[c] * line[c];
+            along += line[c] * (double)term[k][c];
+        }
+        for (int c = 0; c < 3; c++)
+            term[k][c] = square > 0.0 ? (float)(along / square * line[c]) : 0.0f;
+    }
+}
+
 /* Corrections of row i by the pairs of a batch, in supports; no pair gives more than the limit, no wall more
  * than its share of it: of walls twice as dense each has half. */
 static void corrections(const relaxation *r, size_t i, ascc_pair_batch *b, bool walls,
@@ -383,6 +401,8 @@ static void corrections(const relaxation *r, size_t i, ascc_pair_batch *b, bool 
                 term[k][c] *= share;
         }
     }
+    if (r->place && !walls)
+        turn(r, i, b, term);
 }
 
 /* Quanta per kilogram and support of correction. */
@@ -493,11 +513,30 @@ static ascc_status no_memory(const ascc_step_state *state)
     return ascc_fail(state->tools.message, ASCC_ERROR_MEMORY, "no memory for the relaxation");
 }
 
+/* Positions before the step; false without memory. */
+static bool find_lines(relaxation *r)
+{
+    const ascc_particles *p = r->state->particles;
+    const size_t d = (size_t)p->dimension;
+    if (!r->constants->current_direction)
+        return true;
+    double *place = ascc_arena_lend(r->state->tools.arena, r->count, 3 * sizeof *place);
+    for (size_t i = 0; place && i < r->count; i++) {
+        const size_t row = ascc_hierarchy_host_row(&r->state->hierarchy, ASCC_SET_FLUID, i);
+        for (size_t c = 0; c < 3; c++)
+            place[i * 3 + c] = c < d ? p->position[row * d + c] : 0.0;
+    }
+    r->place = place;
+    return place != NULL;
+}
+
 static ascc_status relax(ascc_step_state *state, relaxation *r, int64_t *given)
 {
     const ascc_particles *p = state->particles;
     ascc_step_statistics *s = state->statistics;
     ascc_status status = given ? open_relaxation(r, state) : no_memory(state);
+    if (status == ASCC_OK && !find_lines(r))
+        status = no_memory(state);
     if (status != ASCC_OK)
         return status;
     r->repulsion = (float)(r->constants->repulsion / r->constants->support);
