@@ -126,6 +126,22 @@ run convert published -o old
 holds 'a file that is there is replaced' cmp old m.safetensors
 holds 'nothing else is written' [ ! -e o ]
 
+refuses 2 "a model, or --new with --spacing and --dt, and -o are wanted" relax
+refuses 2 "a model, or --new" relax --new 3 --spacing 0.05 -o r.safetensors
+refuses 2 "'--sweeps' is not understood" relax --new 3 --sweeps 4
+refuses 2 "'--omega' is not understood" relax --new 3 --omega 0.5,x
+refuses 1 "nowhere.safetensors: No such file" relax nowhere.safetensors -o r.safetensors
+echo text >r.txt
+refuses 1 "r.txt: " relax r.txt -o r.safetensors
+refuses 1 "'omega' would not settle" relax --new 3 --spacing 0.05 --dt 0.02 --omega 0.6 -o r.safetensors
+holds 'a refused relaxation leaves no file' test ! -e r.safetensors
+run relax --new 2 --spacing 0.02 --dt 0.005 -o r.safetensors
+holds 'ascc relax --new makes a model that runs' "$ascc" sim r.safetensors dam-break-2d --size 8 -n 20
+run relax r.safetensors --omega 0.5,0.5 --divergence none -o s.safetensors
+holds 'and another relaxation takes its place' sh -c 'grep -q "omega[^a-z]*0.5,0.5]" s.safetensors && ! grep -q divergence s.safetensors'
+refuses 1 "output" relax r.safetensors --none -o s.safetensors
+rm -f r.safetensors s.safetensors r.txt
+
 run sim demo dam-break-2d --size 8 -n 20 --every 10 -o a.safetensors --frames png --ply ply
 report $? 'the demonstration model runs in 2D'
 holds 'the table has particles, phases and energy' sh -c '
