@@ -833,6 +833,8 @@ static void bad_constants_are_refused_by_name(void **state)
         {"{\"support\":0.3,\"rest_volume\":1e-4,\"omega\":[0.5,0.5,0.5,0.5],\"epsilon\":0.1,"
          "\"limit\":0.01}",
          "support"},
+        {"{\"support\":0.4,\"rest_volume\":2e-3,\"omega\":[0.5],\"epsilon\":0.1,\"limit\":0.01}",
+         "rest_volume"},
         {"{\"support\":0.1,\"rest_volume\":-1e-4,\"omega\":[0.5,0.5,0.5,0.5],\"epsilon\":0.1,"
          "\"limit\":0.01}",
          "rest_volume"},

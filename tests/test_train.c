@@ -4,6 +4,7 @@
 #include <math.h>
 #include <unistd.h>
 
+#include "model/model.h"
 #include "support/float_modes.h"
 #include "support/model_builder.h"
 #include "support/oracle.h"
@@ -720,6 +721,44 @@ static void training_lowers_the_loss(void **state)
     free(m);
 }
 
+/* Computed forwards, passed through by the gradient: weights learn all the same, and the file keeps it. */
+static void a_relaxation_is_trained_with_and_kept(void **state)
+{
+    (void)state;
+    model_random random = everything(26, 2);
+    char text[256];
+    (void)snprintf(text, sizeof text,
+                   "{\"support\":%s,\"rest_volume\":%s,\"omega\":[2.9,0.26,0.728,0.353],"
+                   "\"epsilon\":0.1,\"limit\":%s,\"divergence\":[0.5,0.5]}",
+                   model_number(2.0 * SPACING), model_number(0.8 * SPACING * SPACING),
+                   model_number(0.2 * SPACING));
+    random.relaxation = text;
+    const ascc_trainer_options options = augmented();
+    motion *m = make_motion(10, 2);
+    ascc_trainer *a = open_trainer(&options, &random, m);
+    ascc_trainer *b = open_threaded(2, &options, &random, m);
+    double before, after;
+    assert_int_equal(ascc_trainer_gradient(a, 0, 1, 0, 2, &before, NULL), ASCC_OK);
+    iterate(a, 20);
+    iterate(b, 20);
+    assert_same_models(a, b);
+    assert_int_equal(ascc_trainer_gradient(a, 0, 1, 0, 2, &after, NULL), ASCC_OK);
+    print_message("# loss: %.4g before, %.4g after\n", before, after);
+    assert_true(after < before);
+    size_t size;
+    const void *bytes = ascc_trainer_model(a, 0, &size);
+    ascc_context *context = NULL;
+    ascc_model *model = NULL;
+    assert_int_equal(ascc_context_create(NULL, &context), ASCC_OK);
+    assert_int_equal(ascc_model_load_memory(context, bytes, size, &model), ASCC_OK);
+    assert_int_equal(model->plan.relaxation.pressure.count, 4);
+    ascc_model_destroy(&model);
+    ascc_context_destroy(&context);
+    ascc_trainer_destroy(&a);
+    ascc_trainer_destroy(&b);
+    free(m);
+}
+
 /* Cuts the network off from every channel that is a vector's: it sees distances alone. */
 static void blind(ascc_trainer *trainer, size_t d)
 {
@@ -843,6 +882,7 @@ int main(void)
         cmocka_unit_test(twenty_iterations_without_a_gradient_stop_training),
         cmocka_unit_test(the_share_of_true_states_takes_no_steps_before),
         cmocka_unit_test(training_lowers_the_loss),
+        cmocka_unit_test(a_relaxation_is_trained_with_and_kept),
         cmocka_unit_test(augmentation_turns_the_whole_world),
         cmocka_unit_test(the_model_that_comes_out_has_the_weights),
     };

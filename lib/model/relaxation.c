@@ -54,6 +54,13 @@ static void find_constants(ascc_reader *reader, const ascc_plan *plan, ascc_rela
                          SMALLEST_SUPPORT, LARGEST_SUPPORT, apart * r->support);
         return;
     }
+    if (!(apart * r->support >= 0.5 * plan->spacing && apart * r->support <= 2.0 * plan->spacing)) {
+        ascc_reader_fail(reader,
+                         "by 'rest_volume' particles at rest are %g m apart, but must be 0.5 to 2 "
+                         "particle spacings",
+                         apart * r->support);
+        return;
+    }
     r->amount = (d == 2 ? 40.0 / (7.0 * pi) : 8.0 / pi) * r->rest_volume / support;
     r->lattice_response = lattice_response(r->amount, apart, d);
     r->reach = r->support + MARGIN * plan->spacing;
