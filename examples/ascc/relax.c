@@ -39,7 +39,7 @@ static const char help[] =
     "  has; or a model that is a relaxation alone.\n"
     "\n"
     "options, lengths in particle spacings\n"
-    "  --omega A,B,...       weights of the pressure sweeps (2.9,0.26,0.728,0.353)\n"
+    "  --omega A,B,...       weights of the pressure sweeps (0.5,0.5,0.5,0.5)\n"
     "  --divergence A,B,...  of the divergence sweeps, or none (0.5,0.5,0.5,0.5)\n"
     "  --support H           of the cubic spline (2)\n"
     "  --volume V            of a particle at rest, spacings^dimension (0.8)\n"
@@ -267,7 +267,7 @@ int ascc_command_relax(int argc, char **argv)
         fputs(help, stdout);
         return 0;
     }
-    relax r = {.omega = {2.9, 0.26, 0.728, 0.353},
+    relax r = {.omega = {0.5, 0.5, 0.5, 0.5},
                .omega_count = 4,
                .divergence = {0.5, 0.5, 0.5, 0.5},
                .divergence_count = 4,

@@ -13,6 +13,8 @@
 /* Above the largest eigenvalue of a sweep, D^-1 B B^T: 3.2 on a cubic lattice at rest, 2.4 on a square
  * one, more where it is compressed. */
 #define LARGEST_EIGENVALUE 4.0
+/* Of a sweep: a deep column at rest blew up with Chebyshev's weights that began with 4. */
+#define LARGEST_OMEGA 2.0
 
 /* The positive root of x^d = v by Newton, in any build the same. */
 static double root(double v, int32_t d)
@@ -94,7 +96,7 @@ static void read_sweeps(ascc_reader *reader, uint32_t object, const char *key, a
                          ASCC_MAX_SWEEPS);
         return;
     }
-    ascc_reader_numbers(reader, object, key, count, 1e-3, 100.0, sweeps->omega);
+    ascc_reader_numbers(reader, object, key, count, 1e-3, LARGEST_OMEGA, sweeps->omega);
     sweeps->count = count;
     if (reader->status == ASCC_OK && !settles(sweeps))
         ascc_reader_fail(reader,
