@@ -86,7 +86,7 @@ typedef struct model_random {
     int lattice; /* 1: with moments, levels 3, motion 3: a trunk of stencils on lattices where fluid is */
     int moments;   /* bumps of a first layer of pair moments, walls' one more; fluid_only, motion */
     int direction; /* 1: the last layer's pairs act along their present line; bumps, fluid_only */
-    const char *residual; /* type and members of a layer's residual; NULL = identity */
+    const char *residual;   /* type and members of a layer's residual; NULL = identity */
     const char *relaxation; /* JSON object; NULL = none */
 } model_random;
 
