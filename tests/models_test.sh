@@ -54,6 +54,12 @@ for dimension in 2d 3d; do
     check "water$dimension-tiny says that it conserves angular momentum" conserves "$tiny" 'momentum, angular momentum'
     check "water$dimension-tiny conserves angular momentum when drops collide" turns "$tiny" $dimension
 done
+for dimension in 2d 3d; do
+    file=examples/models/pbf$dimension.safetensors
+    check "pbf$dimension has a card with measurements" card pbf$dimension
+    check "pbf$dimension conserves momentum to the bit when drops collide" exact "$file" $dimension
+    check "pbf$dimension gives the same bits on three threads" same "$file" $dimension
+done
 file=examples/models/paper3d.safetensors
 check "paper3d is at most 1 MB" small "$file"
 check "paper3d has a card with measurements" card paper3d

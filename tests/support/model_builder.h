@@ -87,7 +87,8 @@ typedef struct model_random {
     int moments;   /* bumps of a first layer of pair moments, walls' one more; fluid_only, motion */
     const char *relaxation; /* JSON object; NULL = none */
     int direction; /* 1: the last layer's pairs act along their present line; bumps, fluid_only */
-    const char *residual; /* type and members of a layer's residual; NULL = identity */
+    const char *residual;   /* type and members of a layer's residual; NULL = identity */
+    const char *relaxation; /* JSON object; NULL = none */
 } model_random;
 
 unsigned char *model_builder_random(const model_random *options, size_t *size);
