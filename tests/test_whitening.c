@@ -1,9 +1,9 @@
 /* What whitening promises: white inputs, the same network, steps that are those of the whitened weights.
  * SPDX-License-Identifier: MIT */
-#include <errno.h>
 #include <math.h>
 #include <unistd.h>
 
+#include "support/counting.h"
 #include "support/model_builder.h"
 #include "support/tools.h"
 #include "train/trainer.h"
@@ -128,17 +128,17 @@ static ascc_trainer_options options_of(int32_t whiten)
                                   .whiten = whiten};
 }
 
-static ascc_trainer *open_threaded(int32_t threads, const ascc_trainer_options *options,
-                                   const model_random *random, const motion *m)
+static ascc_trainer *open_in(const ascc_context_options *context,
+                             const ascc_trainer_options *options, const model_random *random,
+                             const motion *m)
 {
-    const ascc_context_options wanted = {.size = sizeof wanted, .thread_count = threads};
-    ascc_train_context *context = NULL;
+    ascc_train_context *train = NULL;
     ascc_trainer *trainer = NULL;
     size_t size;
     unsigned char *bytes = model_builder_random(random, &size);
-    assert_int_equal(ascc_train_context_create(&wanted, &context), ASCC_OK);
-    assert_int_equal(ascc_trainer_create(context, options, bytes, size, &trainer), ASCC_OK);
-    ascc_train_context_destroy(&context); /* the trainer lives on */
+    assert_int_equal(ascc_train_context_create(context, &train), ASCC_OK);
+    assert_int_equal(ascc_trainer_create(train, options, bytes, size, &trainer), ASCC_OK);
+    ascc_train_context_destroy(&train); /* the trainer lives on */
     free(bytes);
     assert_int_equal(ascc_trainer_add_sequence(trainer, &m->sequence), ASCC_OK);
     return trainer;
@@ -147,7 +147,7 @@ static ascc_trainer *open_threaded(int32_t threads, const ascc_trainer_options *
 static ascc_trainer *open_trainer(const ascc_trainer_options *options, const model_random *random,
                                   const motion *m)
 {
-    return open_threaded(1, options, random, m);
+    return open_in(NULL, options, random, m);
 }
 
 static void iterate(ascc_trainer *trainer, int count)
@@ -490,10 +490,11 @@ static void threads_do_not_change_the_bits(void **state)
     motion *m = make_motion(8, 3, 12);
     ascc_trainer *t[3];
     for (int32_t i = 0; i < 3; i++) {
+        const ascc_context_options threads = {.size = sizeof threads, .thread_count = 1 + i};
         ascc_trainer_options o = options_of(0);
         o.rotate = o.mirror = 1;
         o.jitter = 0.01;
-        t[i] = open_threaded(1 + i, &o, &random, m);
+        t[i] = open_in(&threads, &o, &random, m);
         iterate(t[i], 3);
     }
     assert_same_bits(t[0], t[1]);
@@ -588,46 +589,34 @@ static void columns_that_do_not_vary_stay_as_they_are(void **state)
 
 /* ---- Memory ---- */
 
-static int allocations_until_failure = -1; /* negative: all succeed */
-
-int __real_posix_memalign(void **memory, size_t alignment, size_t size);
-int __wrap_posix_memalign(void **memory, size_t alignment, size_t size);
-
-int __wrap_posix_memalign(void **memory, size_t alignment, size_t size)
-{
-    if (allocations_until_failure == 0)
-        return ENOMEM;
-    if (allocations_until_failure > 0)
-        allocations_until_failure--;
-    return __real_posix_memalign(memory, alignment, size);
-}
-
 static void without_memory_nothing_is_measured_and_it_is_said(void **state)
 {
     (void)state;
     const model_random random = moments(14, 2);
     const ascc_trainer_options o = options_of(0);
+    test_memory memory = {0};
+    const ascc_context_options context = test_memory_options(&memory);
     motion *m = make_motion(12, 2, 12);
-    ascc_trainer *a = open_trainer(&o, &random, m), *b = open_trainer(&o, &random, m);
+    ascc_trainer *a = open_in(&context, &o, &random, m), *b = open_trainer(&o, &random, m);
     ascc_training_report report = {.size = sizeof report};
-    int failures = 0;
     ascc_status status = ASCC_ERROR_MEMORY;
-    while (status != ASCC_OK) {
-        allocations_until_failure = failures;
+    size_t failures = 0;
+    for (; status != ASCC_OK; failures++) {
+        memory.fail_at = memory.calls + 1 + failures;
         status = ascc_trainer_iterate(a, &report);
-        allocations_until_failure = -1;
         if (status == ASCC_OK)
             break;
         assert_int_equal(status, ASCC_ERROR_MEMORY);
         assert_non_null(strstr(ascc_trainer_message(a), "no memory"));
         assert_int_equal(a->iteration, 0);
-        failures++;
     }
+    memory.fail_at = 0;
     assert_true(failures > 10);
     iterate(b, 1);
     assert_same_bits(a, b);
     ascc_trainer_destroy(&a);
     ascc_trainer_destroy(&b);
+    assert_true(test_memory_is_clean(&memory));
     free(m);
 }
 
