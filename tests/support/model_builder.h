@@ -84,11 +84,10 @@ typedef struct model_random {
     double limit;   /* of what a pair gives, spacings; bumps; 0 = none */
     double contact; /* with walls, spacings; 0 = none */
     int lattice; /* 1: with moments, levels 3, motion 3: a trunk of stencils on lattices where fluid is */
-    int moments;   /* bumps of a first layer of pair moments, walls' one more; fluid_only, motion */
+    int moments; /* bumps of a first layer of pair moments, walls' one more; fluid_only, motion */
     const char *relaxation; /* JSON object; NULL = none */
     int direction; /* 1: the last layer's pairs act along their present line; bumps, fluid_only */
-    const char *residual;   /* type and members of a layer's residual; NULL = identity */
-    const char *relaxation; /* JSON object; NULL = none */
+    const char *residual; /* type and members of a layer's residual; NULL = identity */
 } model_random;
 
 unsigned char *model_builder_random(const model_random *options, size_t *size);
