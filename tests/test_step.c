@@ -1334,6 +1334,45 @@ static void contact_gives_the_same_bits_for_any_number_of_threads(void **state)
     close_world(&four.w);
 }
 
+/* The walls' rows the other way round. */
+static void turn_walls(ascc_particles *p)
+{
+    const size_t n = p->boundary_count * 3;
+    for (size_t k = 0; k < n / 2; k++) {
+        const size_t other = (p->boundary_count - 1 - k / 3) * 3 + k % 3;
+        const double x = p->wall_position[k], normal = p->wall_normal[k];
+        p->wall_position[k] = p->wall_position[other];
+        p->wall_normal[k] = p->wall_normal[other];
+        p->wall_position[other] = x;
+        p->wall_normal[other] = normal;
+    }
+}
+
+static void contact_does_not_ask_in_which_order_the_walls_came(void **state)
+{
+    (void)state;
+    const double gravity[3] = {1.0, -9.81, 2.0};
+    room a = open_room(3, 0.4, 1, 1.0), b = open_room(3, 0.4, 1, 1.0);
+    const size_t n = a.w.particles->boundary_count;
+    assert_int_equal(n % 2, 0); /* so that a row in the middle is not turned twice */
+    turn_walls(b.w.particles);
+    size_t hits = 0;
+    for (int step = 0; step < 40; step++) {
+        run(&a.w, gravity, 1);
+        run(&b.w, gravity, 1);
+        assert_memory_equal(a.w.particles->position, b.w.particles->position,
+                            SHOTS * 3 * sizeof(double));
+        for (size_t k = 0; k < n * 3; k++) {
+            hits += a.w.particles->wall_impulse[k] != 0;
+            assert_true(a.w.particles->wall_impulse[k] ==
+                        b.w.particles->wall_impulse[(n - 1 - k / 3) * 3 + k % 3]);
+        }
+    }
+    assert_true(hits > 100);
+    close_world(&a.w);
+    close_world(&b.w);
+}
+
 static void contact_holds_alike_in_every_unit(void **state)
 {
     (void)state;
@@ -1394,6 +1433,7 @@ int main(void)
         cmocka_unit_test(gravity_is_seen_alike_in_every_unit),
         cmocka_unit_test(nothing_passes_a_wall_with_contact),
         cmocka_unit_test(contact_gives_the_same_bits_for_any_number_of_threads),
+        cmocka_unit_test(contact_does_not_ask_in_which_order_the_walls_came),
         cmocka_unit_test(contact_holds_alike_in_every_unit),
         cmocka_unit_test(contact_takes_what_points_into_the_wall_and_nothing_else),
         cmocka_unit_test(the_models_gravity_is_the_default_in_the_hosts_unit),

@@ -35,9 +35,10 @@ typedef struct contact_job {
 } contact_job;
 
 typedef struct meeting {
-    double when; /* share of the way, > 1 = none */
-    size_t wall; /* host's boundary row */
-    double push; /* along its normal, at the end of the way */
+    double when;   /* share of the way, > 1 = none */
+    size_t wall;   /* host's boundary row */
+    double push;   /* along its normal, at the end of the way */
+    uint32_t rank; /* of the wall in the step's own order, which the host's rows do not decide */
 } meeting;
 
 static size_t wall_of(const contact_job *job, uint32_t neighbor)
@@ -51,7 +52,7 @@ static meeting meet(const contact_job *job, size_t wall, const double *from, con
 {
     const size_t d = (size_t)job->p->dimension;
     const double *w = job->p->wall_position + wall * d, *n = job->p->wall_normal + wall * d;
-    meeting m = {2.0, wall, 0.0};
+    meeting m = {.when = 2.0, .wall = wall};
     double begin = 0.0, end = 0.0, square = 0.0, along = 0.0;
     for (size_t c = 0; c < d; c++) {
         begin += (from[c] - w[c]) * n[c];
@@ -73,16 +74,17 @@ static meeting meet(const contact_job *job, size_t wall, const double *from, con
     return m;
 }
 
-/* The first wall on the way; of walls met at once the one that pushes most, then that of the lowest row. */
+/* The first wall on the way; of walls met at once the one that pushes most, then that of the lowest rank. */
 static meeting first_meeting(const contact_job *job, size_t i, const double *from, const double *to)
 {
     const uint32_t *neighbor = job->rows->neighbor + job->rows->start[i];
-    meeting first = {2.0, 0, 0.0};
+    meeting first = {.when = 2.0};
     for (size_t k = 0; k < job->rows->count[i]; k++) {
-        const meeting m = meet(job, wall_of(job, neighbor[k]), from, to);
+        meeting m = meet(job, wall_of(job, neighbor[k]), from, to);
+        m.rank = neighbor[k];
         if (m.when < first.when ||
             (m.when <= 1.0 && m.when == first.when &&
-             (m.push > first.push || (m.push == first.push && m.wall < first.wall))))
+             (m.push > first.push || (m.push == first.push && m.rank < first.rank))))
             first = m;
     }
     return first;
