@@ -83,7 +83,8 @@ unsigned char *ascc_tensor_file_build(const json_t *header, const void *data, si
         free(bytes);
         return NULL;
     }
-    memcpy(bytes + 8 + padded, data, data_size);
+    if (data_size > 0) /* there may be no data at all */
+        memcpy(bytes + 8 + padded, data, data_size);
     *size = 8 + padded + data_size;
     return bytes;
 }
