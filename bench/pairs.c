@@ -113,8 +113,8 @@ static void flush(bench_pairs *p, const ascc_rows *rows, size_t i, uint32_t *nei
     const float *value = ascc_term_source(&p->run, output);
     const size_t a = ascc_padded(output->inputs);
     float geometry[ASCC_GEOMETRY_ARRAYS * BATCH], term[BATCH][4];
-    const ascc_geometry g =
-        ascc_geometry_of(&p->run, rows, &output->filter, i, neighbor, filled, geometry, BATCH);
+    ascc_geometry g;
+    ascc_geometry_of(&g, &p->run, rows, &output->filter, i, neighbor, filled, geometry, BATCH);
     p->tools.kernels->pair_terms(&g.pairs, g.window, neighbor, count, value + i * a, value, a,
                                  output->filter.cells, ascc_term_packed(&p->run, output), 3,
                                  term[0]);

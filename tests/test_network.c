@@ -117,8 +117,9 @@ static void prolongation_of_a_linear_field_is_that_field(void **state)
                 const uint32_t *neighbor = rows->neighbor + rows->start[i];
                 float scratch[ASCC_GEOMETRY_ARRAYS * 16];
                 assert_true(rows->count[i] <= (dimension == 2 ? 4 : 8));
-                const ascc_geometry g = ascc_geometry_of(&c.run, rows, &term->filter, i, neighbor,
-                                                         rows->count[i], scratch, 16);
+                ascc_geometry g;
+                ascc_geometry_of(&g, &c.run, rows, &term->filter, i, neighbor, rows->count[i],
+                                 scratch, 16);
                 double one = 0.0, offset[3] = {0.0, 0.0, 0.0}, d[3];
                 for (size_t k = 0; k < rows->count[i]; k++) {
                     const double hat = (double)g.window[k];

@@ -8,22 +8,21 @@
 
 #define FAIL(...) ascc_fail(builder->message, ASCC_ERROR_FORMAT, __VA_ARGS__)
 
-ascc_geometry ascc_geometry_of(const ascc_network_run *run, const ascc_rows *rows,
-                               const ascc_filter *filter, size_t query, const uint32_t *neighbor,
-                               size_t count, float *scratch, size_t room)
+void ascc_geometry_of(ascc_geometry *g, const ascc_network_run *run, const ascc_rows *rows,
+                      const ascc_filter *filter, size_t query, const uint32_t *neighbor,
+                      size_t count, float *scratch, size_t room)
 {
-    ascc_geometry g = {{scratch, scratch + room, scratch + 2 * room, {NULL}, NULL}, NULL};
+    *g = (ascc_geometry){{scratch, scratch + room, scratch + 2 * room, {NULL}, NULL}, NULL};
     if (filter->window != ASCC_WINDOW_NONE)
-        g.window = g.pairs.window[filter->window] = scratch + 3 * room;
+        g->window = g->pairs.window[filter->window] = scratch + 3 * room;
     else if (filter->mapping == ASCC_MAPPING_DIRECTION)
-        g.pairs.distance = scratch + 3 * room;
+        g->pairs.distance = scratch + 3 * room;
     const float inverse =
         rows->inverse_cube > 0.0f ? rows->inverse_cube : (float)(1.0 / rows->radius);
     const ascc_points *s = rows->source, *q = rows->query;
     const ascc_coordinates source = {s->low[0], s->low[1], s->low[2]};
     run->tools->kernels->geometry(&source, neighbor, count, q->low[0][query], q->low[1][query],
-                                  q->low[2][query], inverse, (int)filter->mapping, &g.pairs);
-    return g;
+                                  q->low[2][query], inverse, (int)filter->mapping, &g->pairs);
 }
 
 /* Features of a row's neighbours, their motion less the row's own. */
@@ -56,34 +55,34 @@ void ascc_column_scratch(const ascc_plan *plan, const ascc_term *term, ascc_scra
     sizes->reverse = ascc_max_size(sizes->reverse, ascc_max_size(members, 8) * sizes->room);
 }
 
-ascc_neighborhood ascc_column_look(const ascc_network_run *run, const ascc_term *term, size_t row,
-                                   float *scratch, size_t room, const uint32_t *sequence)
+void ascc_column_look(ascc_neighborhood *around, const ascc_network_run *run, const ascc_term *term,
+                      size_t row, float *scratch, size_t room, const uint32_t *sequence)
 {
     const ascc_rows *rows = ascc_term_list(run, term, 0);
     const size_t members = term->filter.bumps ? ascc_cell_count(&term->filter) : 0;
-    ascc_neighborhood around = {.neighbor = rows->neighbor + rows->start[row],
-                                .count = rows->count[row],
-                                .room = room,
-                                .feature = ascc_term_source(run, term),
-                                .factor = scratch + ASCC_GEOMETRY_ARRAYS * room};
-    around.read = around.neighbor;
+    around->neighbor = around->read = rows->neighbor + rows->start[row];
+    around->count = rows->count[row];
+    around->room = room;
+    around->feature = ascc_term_source(run, term);
+    around->relative = NULL;
+    around->factor = scratch + ASCC_GEOMETRY_ARRAYS * room;
     if (ascc_term_is_relative(term)) {
-        around.relative = around.factor + members * room;
-        relative_features(run, term, row, around.neighbor, around.count, around.relative);
-        around.feature = around.relative;
-        around.read = sequence;
+        around->relative = around->factor + members * room;
+        relative_features(run, term, row, around->neighbor, around->count, around->relative);
+        around->feature = around->relative;
+        around->read = sequence;
     }
-    around.geometry = ascc_geometry_of(run, rows, &term->filter, row, around.neighbor, around.count,
-                                       scratch, room);
-    return around;
+    ascc_geometry_of(&around->geometry, run, rows, &term->filter, row, around->neighbor,
+                     around->count, scratch, room);
 }
 
 size_t ascc_column_gather(const ascc_tile *tile, const ascc_term *term, ascc_gather_function gather)
 {
     const size_t stride = ascc_matrix_length(term) + ASCC_COLUMN_PADDING;
+    ascc_neighborhood around;
     for (size_t r = 0; r < tile->n; r++) {
-        const ascc_neighborhood around = ascc_column_look(
-            tile->run, term, tile->list[r], tile->scratch, tile->room, tile->sequence);
+        ascc_column_look(&around, tile->run, term, tile->list[r], tile->scratch, tile->room,
+                         tile->sequence);
         gather(tile->run, term, &around, tile->column + r * stride);
     }
     return tile->n;
@@ -156,8 +155,9 @@ void ascc_column_backward(const ascc_reverse *pass, const ascc_term *term, const
         ascc_matrix_back(pass, term, n);
     for (size_t r = 0; r < n; r++) {
         const float *column_gradient = pass->column_gradient + r * length;
-        const ascc_neighborhood around =
-            ascc_column_look(pass->run, term, list[r], pass->scratch, pass->room, pass->sequence);
+        ascc_neighborhood around;
+        ascc_column_look(&around, pass->run, term, list[r], pass->scratch, pass->room,
+                         pass->sequence);
         gather(pass->run, term, &around, pass->column);
         if (!weightless)
             ascc_matrix_keep_column(pass, term, r);

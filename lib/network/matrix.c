@@ -42,14 +42,6 @@ void ascc_matrix_unpack(const ascc_plan *plan, const ascc_term *term, const floa
         gradient[ASCC_TENSOR_BIAS][o] += packed[bias + o];
 }
 
-void ascc_matrix_add_bias(const ascc_network_run *run, const ascc_term *term, float *row)
-{
-    const float *bias =
-        ascc_term_packed(run, term) + ascc_matrix_length(term) * ascc_padded(term->outputs);
-    for (int32_t c = 0; term->tensor[ASCC_TENSOR_BIAS] && c < term->outputs; c++)
-        row[c] += bias[c];
-}
-
 /* ---- The way back ---- */
 
 void ascc_matrix_transpose(const ascc_plan *plan, const ascc_term *term, const float *packed,

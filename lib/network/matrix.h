@@ -25,7 +25,16 @@ void ascc_matrix_transpose(const ascc_plan *plan, const ascc_term *term, const f
                            float *to);
 
 /* Adds the bias to the term's columns of a row. */
-void ascc_matrix_add_bias(const ascc_network_run *run, const ascc_term *term, float *row);
+static inline void ascc_matrix_add_bias(const ascc_network_run *run, const ascc_term *term,
+                                        float *restrict row)
+{
+    if (!term->tensor[ASCC_TENSOR_BIAS])
+        return;
+    const float *restrict bias =
+        ascc_term_packed(run, term) + ascc_matrix_length(term) * ascc_padded(term->outputs);
+    for (int32_t c = 0; c < term->outputs; c++)
+        row[c] += bias[c];
+}
 
 /* d(column) = d(out) W^T for the tile: pass->column_gradient[n][length]. */
 void ascc_matrix_back(const ascc_reverse *pass, const ascc_term *term, size_t n);

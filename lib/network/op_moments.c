@@ -145,8 +145,8 @@ static void sum_row(const ascc_tile *tile, const ascc_term *term, int list, size
     const float *vectors = vectors_of(run, list, &stride);
     const float *motion = vectors_of(run, 0, &own_stride) + row * own_stride;
     const float own[3] = {motion[0], motion[1], d > 2 ? motion[2] : 0.0f};
-    const ascc_geometry g =
-        ascc_geometry_of(run, rows, &filter, row, neighbor, count, tile->scratch, tile->room);
+    ascc_geometry g;
+    ascc_geometry_of(&g, run, rows, &filter, row, neighbor, count, tile->scratch, tile->room);
     run->tools->kernels->moments(&g.pairs, neighbor, count, vectors, stride, own, list, d, NULL, 0,
                                  (size_t)filter.bumps, sum);
 }

@@ -317,8 +317,8 @@ static void evaluate(ascc_pair_sum *sum, size_t i, ascc_pair_batch *b)
     size_t count = b->count;
     for (; count % 8; count++)
         b->neighbor[count] = b->neighbor[0];
-    const ascc_geometry g =
-        ascc_geometry_of(run, sum->rows, filter, i, b->neighbor, count, geometry, ASCC_PAIR_BATCH);
+    ascc_geometry g;
+    ascc_geometry_of(&g, run, sum->rows, filter, i, b->neighbor, count, geometry, ASCC_PAIR_BATCH);
     for (int part = ASCC_TENSOR_STRENGTH; part <= ASCC_TENSOR_DAMPING; part++)
         if (c->part[part])
             run->tools->kernels->pair_strengths(
@@ -346,8 +346,9 @@ static void evaluate_walls(ascc_pair_sum *sum, size_t i, ascc_pair_batch *b)
     float geometry[ASCC_GEOMETRY_ARRAYS * ASCC_PAIR_BATCH];
     double t[3][ASCC_PAIR_BATCH], square[ASCC_PAIR_BATCH];
     strengths s;
-    const ascc_geometry g = ascc_geometry_of(run, sum->rows, filter, i, b->neighbor, b->count,
-                                             geometry, ASCC_PAIR_BATCH);
+    ascc_geometry g;
+    ascc_geometry_of(&g, run, sum->rows, filter, i, b->neighbor, b->count, geometry,
+                     ASCC_PAIR_BATCH);
     for (int part = ASCC_TENSOR_WALL; part <= ASCC_TENSOR_WALL_DAMPING; part++)
         if (c->part[part])
             run->tools->kernels->pair_strengths(

@@ -248,8 +248,9 @@ static void evaluate(ascc_pair_sum *sum, size_t i, ascc_pair_batch *b)
     const size_t d = (size_t)plan->dimension, a = ascc_padded(output->inputs);
     const float *value = ascc_term_source(run, output);
     float geometry[ASCC_GEOMETRY_ARRAYS * ASCC_PAIR_BATCH], term[ASCC_PAIR_BATCH][4];
-    const ascc_geometry g = ascc_geometry_of(run, sum->rows, &output->filter, i, b->neighbor,
-                                             fill_up(b), geometry, ASCC_PAIR_BATCH);
+    ascc_geometry g;
+    ascc_geometry_of(&g, run, sum->rows, &output->filter, i, b->neighbor, fill_up(b), geometry,
+                     ASCC_PAIR_BATCH);
     run->tools->kernels->pair_terms(&g.pairs, g.window, b->neighbor, b->count, value + i * a, value,
                                     a, output->filter.cells, ascc_term_packed(run, output), d,
                                     term[0]);
