@@ -301,6 +301,11 @@ run train log.json --iterations 2
 [ $? -eq 1 ] && grep -q 'ascc train: /dev/full: ' err
 report $? 'a log that cannot be written is an error'
 
+echo 'not a log' >notes.csv
+config notes.json notes 's|"batch"|"log": "notes.csv", "batch"|'
+refuses 1 'notes.csv: is not the log of a training run' train notes.json --iterations 2
+holds 'a file that is no log is left as it is' sh -c 'echo "not a log" | cmp - notes.csv'
+
 # ---- A published network ----
 
 tail -c +2 "$source/tests/fuzz/corpus/model/cconv-f" >published

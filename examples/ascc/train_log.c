@@ -61,13 +61,16 @@ static ascc_validation validation_of(const double field[FIELDS])
                              .stable = v[5] == 1.0};
 }
 
-/* Reads rows up to `iteration`; the offset behind the last of them, 0 = no log. */
+/* Reads rows up to `iteration`; the offset behind the last of them, 0 = an empty file, -1 = not a log. */
 static long read_rows(FILE *file, uint64_t iteration, ascc_train_log *log)
 {
     char line[1024];
     double field[FIELDS];
-    if (!fgets(line, sizeof line, file) ||
-        (strcmp(line, HEADER) != 0 && strcmp(line, OLD_HEADER) != 0))
+    if (!fgets(line, sizeof line, file))
+        return 0;
+    if (strcmp(line, HEADER) != 0 && strcmp(line, OLD_HEADER) != 0)
+        return -1;
+    if (iteration == 0)
         return 0;
     long end = ftell(file);
     while (fgets(line, sizeof line, file) && parse(line, field) && field[0] <= (double)iteration) {
@@ -82,18 +85,21 @@ static long read_rows(FILE *file, uint64_t iteration, ascc_train_log *log)
 bool ascc_train_log_open(const char *path, uint64_t iteration, ascc_train_log *log, char *error,
                          size_t capacity)
 {
-    *log = (ascc_train_log){.file = fopen(path, iteration ? "r+" : "w")};
-    if (!log->file && iteration && errno == ENOENT)
+    *log = (ascc_train_log){.file = fopen(path, "r+")};
+    if (!log->file && errno == ENOENT)
         log->file = fopen(path, "w+");
     bool good = log->file != NULL;
+    const char *why = NULL;
     if (good) {
-        const long end = iteration ? read_rows(log->file, iteration, log) : 0;
-        good = fflush(log->file) == 0 && ftruncate(fileno(log->file), end) == 0 &&
+        const long end = read_rows(log->file, iteration, log);
+        if (end < 0)
+            why = "is not the log of a training run, so it is left as it is";
+        good = end >= 0 && fflush(log->file) == 0 && ftruncate(fileno(log->file), end) == 0 &&
                fseek(log->file, end, SEEK_SET) == 0 && (end > 0 || fputs(HEADER, log->file) >= 0) &&
                fflush(log->file) == 0;
     }
     if (!good) {
-        (void)snprintf(error, capacity, "%.300s: %s", path, strerror(errno));
+        (void)snprintf(error, capacity, "%.300s: %s", path, why ? why : strerror(errno));
         ascc_train_log_close(log);
     }
     return good;
