@@ -21,7 +21,7 @@ setup() {
             echo "Installing: $packages"
             $as_root env DEBIAN_FRONTEND=noninteractive apt-get update -q >/dev/null
             # shellcheck disable=SC2086
-            $as_root env DEBIAN_FRONTEND=noninteractive apt-get install -q -y $packages >/dev/null
+            $as_root env DEBIAN_FRONTEND=noninteractive apt-get install -q -y --no-remove $packages >/dev/null
         fi
     fi
     setup_have && return 0
