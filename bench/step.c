@@ -271,9 +271,10 @@ static double count_flops(const subject *s)
 /* ---- bench step ---- */
 
 /* The whole step, then its stages. */
-static const char *const phases[] = {"total", "forces",  "sight",   "search", "network",
-                                     "pairs", "advance", "contact", "commit"};
-#define PHASES 9
+static const char *const phases[] = {"total",   "forces",     "sight",   "search",
+                                     "network", "pairs",      "advance", "relaxation",
+                                     "contact", "divergence", "commit"};
+#define PHASES (sizeof phases / sizeof *phases)
 
 static double seconds_of_phase(const ascc_step_statistics *s, size_t phase)
 {
@@ -336,8 +337,8 @@ static void step_row(const bench_options *b, bench_table *table, const subject_o
 
 static const char step_columns[] =
     "scene,model,dimension,particles,walls,variant,threads,ns_per_particle,min,max,forces,"
-    "sight,search,network,pairs,advance,contact,commit,gflops,peak_share,neighbours_per_particle,"
-    "scratch_bytes_per_particle,momentum_drift_quanta,real_time_particles";
+    "sight,search,network,pairs,advance,relaxation,contact,divergence,commit,gflops,peak_share,"
+    "neighbours_per_particle,scratch_bytes_per_particle,momentum_drift_quanta,real_time_particles";
 static const char step_note[] =
     "ns per particle by phase; CPU time on one thread, wall-clock on more; drift is exact; "
     "real_time_particles: as many at this time each take the model's time step";
