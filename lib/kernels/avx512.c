@@ -1,22 +1,22 @@
 /* The kernels for AVX-512 F, BW, DQ and VL: the common text in registers of eight floats, of which there
- * are 32 now; products sixteen columns wide; a search that compacts sixteen candidates at once.
+ * are 32 now; products sixteen columns wide; searches that compact sixteen candidates at once.
  * SPDX-License-Identifier: MIT
  *
- * Never yet run on a CPU that has AVX-512, so no speed is known either. It compiles with gcc 12 and
- * clang 14, and tests/cross_test.sh runs this text over intrinsics emulated lane by lane. Where a
- * machine has AVX-512, every test runs it. */
+ * Where a machine has AVX-512, every test runs this; elsewhere tests/cross_test.sh runs the text over
+ * intrinsics emulated lane by lane. */
 #include <immintrin.h>
 #include <stddef.h>
 #include <stdint.h>
 
 #include "kernels.h"
 
-/* The loop of search() in body.h, same operations in the same order. */
-static size_t search_avx512(const ascc_coordinates *points, size_t begin, size_t end, int32_t x,
-                            int32_t y, int32_t z, float limit, uint32_t *restrict found)
+/* The loops of search() and, with cube, search_cube() in body.h, same operations in the same order. */
+static inline size_t search_lanes(const ascc_coordinates *points, size_t begin, size_t end,
+                                  int32_t x, int32_t y, int32_t z, float limit, int cube,
+                                  uint32_t *restrict found)
 {
     const __m512i qx = _mm512_set1_epi32(x), qy = _mm512_set1_epi32(y), qz = _mm512_set1_epi32(z);
-    const __m512 limits = _mm512_set1_ps(limit);
+    const __m512 limits = _mm512_set1_ps(limit), one = _mm512_set1_ps(1.0f);
     const __m512i steps = _mm512_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
     size_t count = 0;
     for (size_t i = begin; i < end; i += 16) {
@@ -28,15 +28,37 @@ static size_t search_avx512(const ascc_coordinates *points, size_t begin, size_t
             _mm512_sub_epi32(_mm512_maskz_loadu_epi32(valid, points->y + i), qy));
         const __m512 dz = _mm512_cvtepi32_ps(
             _mm512_sub_epi32(_mm512_maskz_loadu_epi32(valid, points->z + i), qz));
-        const __m512 square = _mm512_add_ps(
-            _mm512_add_ps(_mm512_mul_ps(dx, dx), _mm512_mul_ps(dy, dy)), _mm512_mul_ps(dz, dz));
-        const __mmask16 near = _mm512_mask_cmp_ps_mask(valid, square, limits, _CMP_LE_OQ);
+        __mmask16 near;
+        if (cube) {
+            const __m512 ax = _mm512_abs_ps(_mm512_mul_ps(dx, limits));
+            const __m512 ay = _mm512_abs_ps(_mm512_mul_ps(dy, limits));
+            const __m512 az = _mm512_abs_ps(_mm512_mul_ps(dz, limits));
+            near = _mm512_mask_cmp_ps_mask(valid, _mm512_max_ps(_mm512_max_ps(ax, ay), az), one,
+                                           _CMP_LT_OQ);
+        } else {
+            const __m512 square = _mm512_add_ps(
+                _mm512_add_ps(_mm512_mul_ps(dx, dx), _mm512_mul_ps(dy, dy)), _mm512_mul_ps(dz, dz));
+            near = _mm512_mask_cmp_ps_mask(valid, square, limits, _CMP_LE_OQ);
+        }
         const __m512i rows = _mm512_add_epi32(_mm512_set1_epi32((int)(uint32_t)i), steps);
         /* Compressed in a register: found has room for a whole one, and that store is the fast one. */
         _mm512_storeu_si512(found + count, _mm512_maskz_compress_epi32(near, rows));
         count += (size_t)_mm_popcnt_u32(near);
     }
     return count;
+}
+
+static size_t search_avx512(const ascc_coordinates *points, size_t begin, size_t end, int32_t x,
+                            int32_t y, int32_t z, float limit, uint32_t *restrict found)
+{
+    return search_lanes(points, begin, end, x, y, z, limit, 0, found);
+}
+
+static size_t search_cube_avx512(const ascc_coordinates *points, size_t begin, size_t end,
+                                 int32_t x, int32_t y, int32_t z, float inverse,
+                                 uint32_t *restrict found)
+{
+    return search_lanes(points, begin, end, x, y, z, inverse, 1, found);
 }
 
 /* TILE of body.h with registers of sixteen floats: out[rows][vectors * 16] += in * weight. */
@@ -97,6 +119,7 @@ static size_t multiply_wide(const float *in, size_t in_stride, size_t n, size_t 
 
 #define ASCC_USE_AVX2
 #define SEARCH search_avx512
+#define SEARCH_CUBE search_cube_avx512
 #define MULTIPLY_FIRST multiply_wide
 #define ASCC_VARIANT ascc_kernels_avx512
 #include "body.h"

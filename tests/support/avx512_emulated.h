@@ -74,12 +74,22 @@ static inline void NAMED(storeu_si512)(void *p, wide_integers a)
 {
     memcpy(p, a.lane, sizeof a.lane);
 }
-/* _CMP_LE_OQ only. */
-static inline uint16_t NAMED(mask_le)(uint16_t mask, wide_floats a, wide_floats b)
+static inline wide_floats NAMED(abs_ps)(wide_floats a)
+{
+    EACH(wide_floats, fabsf(a.lane[i]));
+}
+static inline wide_floats NAMED(max_ps)(wide_floats a, wide_floats b)
+{
+    EACH(wide_floats, a.lane[i] > b.lane[i] ? a.lane[i] : b.lane[i]);
+}
+/* _CMP_LE_OQ and _CMP_LT_OQ only. */
+static inline uint16_t NAMED(mask_compare)(uint16_t mask, wide_floats a, wide_floats b,
+                                           int comparison)
 {
     unsigned r = 0;
     for (int i = 0; i < 16; i++)
-        r |= (unsigned)(a.lane[i] <= b.lane[i]) << i;
+        r |= (unsigned)(comparison == _CMP_LT_OQ ? a.lane[i] < b.lane[i] : a.lane[i] <= b.lane[i])
+             << i;
     return (uint16_t)(r & mask);
 }
 static inline wide_integers NAMED(maskz_compress_epi32)(uint16_t mask, wide_integers a)
@@ -104,5 +114,7 @@ static inline wide_integers NAMED(maskz_compress_epi32)(uint16_t mask, wide_inte
 #define _mm512_loadu_ps NAMED(loadu_ps)
 #define _mm512_storeu_ps NAMED(storeu_ps)
 #define _mm512_storeu_si512 NAMED(storeu_si512)
-#define _mm512_mask_cmp_ps_mask(mask, a, b, comparison) NAMED(mask_le)(mask, a, b)
+#define _mm512_abs_ps NAMED(abs_ps)
+#define _mm512_max_ps NAMED(max_ps)
+#define _mm512_mask_cmp_ps_mask NAMED(mask_compare)
 #define _mm512_maskz_compress_epi32 NAMED(maskz_compress_epi32)
