@@ -49,4 +49,10 @@ static inline size_t ascc_hierarchy_host_row(const ascc_hierarchy *hierarchy, in
     return hierarchy->origin[set == ASCC_SET_ALL ? row : hierarchy->whole[set][row]];
 }
 
+/* Host's boundary row of a row of the boundary. */
+static inline size_t ascc_hierarchy_wall_row(const ascc_hierarchy *hierarchy, size_t row)
+{
+    return ascc_hierarchy_host_row(hierarchy, ASCC_SET_BOUNDARY, row) - hierarchy->fluid_count;
+}
+
 #endif

@@ -74,12 +74,6 @@ void ascc_pair_sum_add(ascc_pair_sum *sum, size_t i, const ascc_pair_batch *batc
     }
 }
 
-/* The host's boundary row of a neighbour. */
-static size_t wall_of(const ascc_hierarchy *h, uint32_t neighbor)
-{
-    return h->origin[h->whole[ASCC_SET_BOUNDARY][neighbor]] - h->fluid_count;
-}
-
 /* Adds to a wall that several threads may push at once: integers, so their order does not matter.
  * False when the sum comes near what can be held: one more pair cannot overflow it. */
 static bool push_wall(int64_t *sum, int64_t impulse)
@@ -95,7 +89,7 @@ void ascc_pair_sum_add_walls(ascc_pair_sum *sum, size_t i, const ascc_pair_batch
     int64_t quanta[ASCC_PAIR_BATCH], *wall[ASCC_PAIR_BATCH];
     bool good = true;
     for (size_t k = 0; k < batch->count; k++)
-        wall[k] = sum->wall + wall_of(sum->run->hierarchy, batch->neighbor[k]) * d;
+        wall[k] = sum->wall + ascc_hierarchy_wall_row(sum->run->hierarchy, batch->neighbor[k]) * d;
     for (size_t c = 0; c < d && good; c++) {
         good = ascc_round_quanta(impulse[c], batch->count, quanta);
         for (size_t k = 0; k < batch->count && good; k++)

@@ -36,22 +36,16 @@ typedef struct contact_job {
 
 typedef struct meeting {
     double when;   /* share of the way, > 1 = none */
-    size_t wall;   /* host's boundary row */
-    double push;   /* along its normal, at the end of the way */
-    uint32_t rank; /* of the wall in the step's own order, which the host's rows do not decide */
+    double push;   /* along the wall's normal, at the end of the way */
+    uint32_t wall; /* in the step's own order, which the host's rows do not decide */
 } meeting;
 
-static size_t wall_of(const contact_job *job, uint32_t neighbor)
-{
-    const ascc_hierarchy *h = job->run->hierarchy;
-    return h->origin[h->whole[ASCC_SET_BOUNDARY][neighbor]] - h->fluid_count;
-}
-
 /* Where the way from `from` to `to` meets this wall; meeting.when > 1 if it does not. */
-static meeting meet(const contact_job *job, size_t wall, const double *from, const double *to)
+static meeting meet(const contact_job *job, uint32_t wall, const double *from, const double *to)
 {
-    const size_t d = (size_t)job->p->dimension;
-    const double *w = job->p->wall_position + wall * d, *n = job->p->wall_normal + wall * d;
+    const size_t d = (size_t)job->p->dimension,
+                 row = ascc_hierarchy_wall_row(job->run->hierarchy, wall);
+    const double *w = job->p->wall_position + row * d, *n = job->p->wall_normal + row * d;
     meeting m = {.when = 2.0, .wall = wall};
     double begin = 0.0, end = 0.0, square = 0.0, along = 0.0;
     for (size_t c = 0; c < d; c++) {
@@ -74,17 +68,16 @@ static meeting meet(const contact_job *job, size_t wall, const double *from, con
     return m;
 }
 
-/* The first wall on the way; of walls met at once the one that pushes most, then that of the lowest rank. */
+/* The first wall on the way; of walls met at once the one that pushes most, then the one that comes first. */
 static meeting first_meeting(const contact_job *job, size_t i, const double *from, const double *to)
 {
     const uint32_t *neighbor = job->rows->neighbor + job->rows->start[i];
     meeting first = {.when = 2.0};
     for (size_t k = 0; k < job->rows->count[i]; k++) {
-        meeting m = meet(job, wall_of(job, neighbor[k]), from, to);
-        m.rank = neighbor[k];
+        const meeting m = meet(job, neighbor[k], from, to);
         if (m.when < first.when ||
             (m.when <= 1.0 && m.when == first.when &&
-             (m.push > first.push || (m.push == first.push && m.rank < first.rank))))
+             (m.push > first.push || (m.push == first.push && m.wall < first.wall))))
             first = m;
     }
     return first;
@@ -127,12 +120,13 @@ static bool hold_row(contact_job *job, size_t i)
         const meeting m = first_meeting(job, i, from, to);
         if (m.when > 1.0)
             break;
-        const double *normal = job->p->wall_normal + m.wall * d;
+        const size_t wall = ascc_hierarchy_wall_row(job->run->hierarchy, m.wall);
+        const double *normal = job->p->wall_normal + wall * d;
         for (size_t c = 0; c < d; c++) {
             from[c] += m.when * (to[c] - from[c]);
             to[c] = n + 1 < MEETINGS ? to[c] + m.push * normal[c] : from[c];
         }
-        if (!end_at(job, row, m.wall, to))
+        if (!end_at(job, row, wall, to))
             return false;
     }
     return true;

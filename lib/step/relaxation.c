@@ -242,8 +242,7 @@ static bool lend_volumes(relaxation *r)
     const size_t count = h->set[ASCC_SET_BOUNDARY].count;
     float *volume = ascc_arena_lend(r->state->tools.arena, count, sizeof *volume);
     for (size_t i = 0; volume && i < count; i++)
-        volume[i] = r->state->walls
-                        ->volume[ascc_hierarchy_host_row(h, ASCC_SET_BOUNDARY, i) - h->fluid_count];
+        volume[i] = r->state->walls->volume[ascc_hierarchy_wall_row(h, i)];
     r->wall_volume = volume;
     return volume != NULL;
 }
