@@ -378,6 +378,34 @@ static void gradients_of_penalties_are_right(void **state)
     print_message("# penalties: %.2g\n", worst);
 }
 
+/* Clamps, limits, repulsion and surfaces included, each of which some of these cases meet. */
+static void gradients_through_the_relaxation_are_right(void **state)
+{
+    (void)state;
+    double worst = 0.0;
+    for (int v = 0; v < 8; v++) {
+        const int d = 2 + v % 2;
+        char text[512];
+        (void)snprintf(text, sizeof text,
+                       "{\"support\":%s,\"rest_volume\":%s,\"omega\":[0.5,0.4%s],\"epsilon\":0.1,"
+                       "\"limit\":%s%s%s%s}",
+                       model_number(2.0 * SPACING),
+                       model_number((v / 4 ? 0.6 : 0.9) * pow(SPACING, d)), v / 2 % 2 ? "" : ",0.5",
+                       model_number((v % 3 ? 0.2 : 0.02) * SPACING),
+                       v % 4 ? ",\"divergence\":[0.5,0.5,0.3]" : "",
+                       v / 2 % 2 ? ",\"direction\":\"current\"" : "",
+                       v % 3 ? ",\"repulsion\":{\"distance\":0.04,\"stiffness\":0.7}" : "");
+        gradient_case c = {.name = "relaxation",
+                           .random = everything(1800 + (uint64_t)v, d),
+                           .unroll = 1 + v % 3,
+                           .constant_positions = v / 3 % 2,
+                           .samples = 24};
+        c.random.relaxation = text;
+        worst = fmax(worst, check_gradient(&c));
+    }
+    print_message("# relaxation: %.2g\n", worst);
+}
+
 /* ---- Promises ---- */
 
 static ascc_trainer_options augmented(void)
@@ -872,6 +900,7 @@ int main(void)
         cmocka_unit_test(gradients_of_rollouts_are_right),
         cmocka_unit_test(gradients_with_positions_as_constants_are_right),
         cmocka_unit_test(gradients_of_penalties_are_right),
+        cmocka_unit_test(gradients_through_the_relaxation_are_right),
         cmocka_unit_test(same_seed_gives_the_same_weights_for_any_threads),
         cmocka_unit_test(the_hosts_floating_point_environment_changes_no_weight),
         cmocka_unit_test(going_on_from_a_saved_state_gives_the_same_bits),

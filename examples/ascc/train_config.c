@@ -366,6 +366,7 @@ static void read_options(reading *g, json_t *root, ascc_trainer_options *o)
     o->wall_weight = number_or(r, root, "wall_weight", 0.0, MANY, 0.0);
     o->truth_share = number_or(r, root, "truth_share", 0.0, 1.0, 0.0);
     o->whiten = flag_or(r, root, "whiten", true) ? 0 : -1;
+    o->relaxation_gradients = flag_or(r, root, "relaxation_gradients", true) ? 0 : -1;
     o->position_gradients = flag_or(r, root, "position_gradients", false);
     const double gib = number_or(r, root, "memory", 1e-3, 1e6, 0.0);
     o->memory_limit = (size_t)(gib * 1024.0 * 1024.0 * 1024.0);

@@ -507,6 +507,33 @@ static int64_t *lend_given(ascc_step_state *state)
                            sizeof(int64_t));
 }
 
+/* What a way back begins with; all true where there is none. */
+static bool keep_positions(ascc_step_state *state)
+{
+    const ascc_particles *p = state->particles;
+    const size_t numbers = p->fluid_count * (size_t)p->dimension;
+    if (!state->keeps_relaxed)
+        return true;
+    double *to = ascc_arena_take(state->tools.arena, numbers, sizeof *to);
+    if (to)
+        memcpy(to, state->advance.position, numbers * sizeof *to);
+    state->relaxed.position = to;
+    return to != NULL;
+}
+
+static bool keep_velocities(ascc_step_state *state)
+{
+    const ascc_particles *p = state->particles;
+    const size_t d = (size_t)p->dimension, numbers = p->fluid_count * d;
+    if (!state->keeps_relaxed)
+        return true;
+    double *to = ascc_arena_take(state->tools.arena, numbers, sizeof *to);
+    for (size_t k = 0; to && k < numbers; k++)
+        to[k] = (double)state->advance.momentum[k] * p->quantum / p->mass[k / d];
+    state->relaxed.velocity = to;
+    return to != NULL;
+}
+
 static ascc_status no_memory(const ascc_step_state *state)
 {
     return ascc_fail(state->tools.message, ASCC_ERROR_MEMORY, "no memory for the relaxation");
@@ -556,6 +583,8 @@ ascc_status ascc_stage_relaxation(ascc_step_state *state)
 {
     if (!state->network->plan->relaxation.pressure.count || !state->particles->fluid_count)
         return ASCC_OK;
+    if (!keep_positions(state))
+        return no_memory(state);
     const ascc_arena_mark mark = ascc_arena_mark_of(state->tools.arena);
     relaxation r;
     const ascc_status status = relax(state, &r, lend_given(state));
@@ -618,6 +647,8 @@ ascc_status ascc_stage_divergence(ascc_step_state *state)
 {
     if (!state->network->plan->relaxation.divergence.count || !state->particles->fluid_count)
         return ASCC_OK;
+    if (!keep_velocities(state))
+        return no_memory(state);
     const ascc_arena_mark mark = ascc_arena_mark_of(state->tools.arena);
     relaxation r;
     const ascc_status status = slow_down(state, &r, lend_given(state));

@@ -29,6 +29,12 @@ typedef struct ascc_advance {
     int64_t *external; /* impulse of gravity and acceleration, quanta */
 } ascc_advance;
 
+/* What the relaxation began with, kept for a way back: [fluid count][dimension], host's units, or NULL. */
+typedef struct ascc_relaxed {
+    double *position; /* where the network left the particles */
+    double *velocity; /* before their divergence was taken from them */
+} ascc_relaxed;
+
 /* All intermediate results of one step, in its arena: valid until that is reset. */
 typedef struct ascc_step_state {
     /* What a step begins with: */
@@ -39,6 +45,7 @@ typedef struct ascc_step_state {
     size_t *expected;                                     /* of the network's neighbour lists */
     ascc_status (*engine)(struct ascc_step_state *state); /* engine.h */
     ascc_wall_volumes *walls;
+    bool keeps_relaxed; /* below */
     ascc_search_tools tools;
     ascc_step_statistics *statistics; /* also the times of stages */
     double since;                     /* when the stage under way began, s */
@@ -49,6 +56,7 @@ typedef struct ascc_step_state {
     ascc_arena_mark before_features;
     ascc_hierarchy hierarchy;
     ascc_network_run run;
+    ascc_relaxed relaxed;
 } ascc_step_state;
 
 typedef ascc_status (*ascc_stage)(ascc_step_state *state);

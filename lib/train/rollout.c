@@ -5,6 +5,8 @@
 #include <math.h>
 #include <string.h>
 
+#include "relaxation_reverse.h"
+
 /* Steps without gradient have blown up where particles are this far off on average, spacings. */
 #define BLOWN_UP 2.0
 
@@ -21,8 +23,10 @@ bool ascc_rollout_worker_open(ascc_rollout_worker *w, ascc_context *context,
     w->state = ascc_allocate(&context->allocator, w->kept_count, sizeof *w->state);
     for (size_t i = 0; w->kept && i < w->kept_count; i++)
         ascc_arena_open(&w->kept[i], &context->allocator);
-    if (w->kept && w->state && ascc_step_create(context, model, NULL, &w->step) == ASCC_OK)
+    if (w->kept && w->state && ascc_step_create(context, model, NULL, &w->step) == ASCC_OK) {
+        w->step->keeps_relaxed = true;
         return true;
+    }
     ascc_rollout_worker_close(w);
     return false;
 }
@@ -213,13 +217,20 @@ static ascc_status step_back(rollout *r, size_t t, const ascc_step_state *state,
     ascc_rollout_worker *w = r->worker;
     const size_t n = r->numbers;
     const double dt = r->motion.time_step;
+    memset(r->seen, 0, 3 * n * sizeof *r->seen); /* seen, place, velocity lie together */
+    const ascc_relaxation_gradients relaxed = {.before = r->state + t * n,
+                                               .position = r->by_position,
+                                               .velocity = r->by_velocity,
+                                               .by_before = r->place};
+    if (r->task->relaxation_gradients &&
+        ascc_relaxation_backward(state, &w->scratch, &relaxed) != ASCC_OK)
+        return ASCC_ERROR_MEMORY;
     /* x' = x + dt v', v' = v* + dv: by_velocity is from here on of v', and of dv */
     for (size_t k = 0; k < n; k++)
         r->by_velocity[k] += dt * r->by_position[k];
     ascc_arena_reset(&w->scratch);
     const bool first = t == 0;
     const bool places = r->task->position_gradients && !first;
-    memset(r->seen, 0, 3 * n * sizeof *r->seen); /* seen, place, velocity lie together */
     const ascc_backward pass = {.run = &state->run,
                                 .transposed = r->transposed,
                                 .arena = &w->scratch,

@@ -16,7 +16,7 @@ typedef struct ascc_rollout_task {
     double jitter;      /* m and, over a time step, m/s */
     ascc_random random; /* of the jitter */
     double neighbor_weight, density_weight, wall_weight;
-    bool position_gradients;
+    bool position_gradients, relaxation_gradients;
     bool backward;       /* false: the loss alone */
     size_t memory_limit; /* of kept steps, bytes */
 } ascc_rollout_task;

@@ -31,7 +31,7 @@ static void give(ascc_trainer *t, void *memory, size_t count, size_t element)
 }
 
 /* The first released layouts. */
-#define FIRST_OPTIONS_SIZE sizeof(ascc_trainer_options)
+#define FIRST_OPTIONS_SIZE (offsetof(ascc_trainer_options, whiten) + sizeof(int32_t))
 #define FIRST_STAGE_SIZE sizeof(ascc_training_stage)
 #define FIRST_SEQUENCE_SIZE sizeof(ascc_training_sequence)
 #define FIRST_REPORT_SIZE sizeof(ascc_training_report)
@@ -91,6 +91,8 @@ static ascc_status read_options(ascc_trainer *t, const ascc_trainer_options *giv
                       "batch within 0 and 65536");
     if (o->whiten < -1 || o->whiten > 0)
         return REFUSE(ASCC_ERROR_ARGUMENT, "options: whiten is 0 or -1");
+    if (o->relaxation_gradients < -1 || o->relaxation_gradients > 0)
+        return REFUSE(ASCC_ERROR_ARGUMENT, "options: relaxation_gradients is 0 or -1");
     o->batch = o->batch ? o->batch : 8;
     o->beta1 = o->beta1 > 0.0 ? o->beta1 : 0.9;
     o->beta2 = o->beta2 > 0.0 ? o->beta2 : 0.999;
@@ -387,6 +389,7 @@ static ascc_rollout_task make_task(const ascc_trainer *t, size_t sequence)
         .density_weight = t->options.density_weight,
         .wall_weight = t->options.wall_weight,
         .position_gradients = t->options.position_gradients != 0,
+        .relaxation_gradients = t->options.relaxation_gradients >= 0,
         .backward = true,
         .memory_limit = t->options.memory_limit / (size_t)t->thread_count,
     };

@@ -4,6 +4,7 @@
 #include "file/safetensors.h"
 #include "network/column.h"
 #include "network/operations.h"
+#include "relaxation_oracle.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -825,7 +826,8 @@ void oracle_step(oracle *o, double *position, double *velocity, double *correcti
     const size_t d = (size_t)plan->dimension, numbers = o->fluid_count * d;
     const double dt = plan->time_step;
     double *after = take(numbers, sizeof *after), *seen = take(numbers, sizeof *seen);
-    double *moved = take(numbers, sizeof *moved);
+    double *moved = take(numbers, sizeof *moved), *before = take(numbers, sizeof *before);
+    memcpy(before, position, numbers * sizeof *before);
     for (size_t k = 0; k < numbers; k++) {
         after[k] = velocity[k] + dt * o->gravity[k % d];
         seen[k] = position[k] + (plan->advection == ASCC_ADVECT_NONE ? 0.0
@@ -845,9 +847,12 @@ void oracle_step(oracle *o, double *position, double *velocity, double *correcti
         if (correction)
             correction[k] = moved[k];
     }
+    if (plan->relaxation.pressure.count)
+        relaxation_oracle(plan, o->fluid_count, o->wall_count, o->wall, before, position, velocity);
     for (int32_t v = 0; v < plan->layer_count + 2; v++)
         free(n.value[v].row);
     free(n.value);
+    free(before);
     free(moved);
     free(seen);
     free(after);
