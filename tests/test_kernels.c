@@ -473,11 +473,11 @@ static void moments_equal_doubles_and_have_the_same_bits_on_every_cpu(void **sta
                 double sum[8] = {0.0}, q[8];
                 for (size_t i = 0; i < k; i++) {
                     const float u[3] = {coordinate[0][i], coordinate[1][i], coordinate[2][i]};
-                    const double share = bump_of((double)coordinate[3][i], bumps, b) *
-                                         (weighted ? (double)weight[neighbor[i] * 3] : 1.0);
+                    const double bump = bump_of((double)coordinate[3][i], bumps, b);
+                    const double scale = weighted ? (double)weight[neighbor[i] * 3] : 1.0;
                     numbers_of(u, feature + neighbor[i] * a, own, wall, dimension, q);
                     for (size_t n = 0; n < 8; n++)
-                        sum[n] += share * q[n];
+                        sum[n] += bump * (n < 5 ? scale : 1.0) * q[n];
                 }
                 for (size_t n = 0; n < 8; n++)
                     assert_true(fabs(sum[n] - (double)want[b * 8 + n]) < 1e-5 * (double)(k + 1));

@@ -99,6 +99,7 @@ static void moments(int v, model_random *r)
     r->motion = 1 + v / 3 % 2;
     r->damping = v / 2 % 2;
     r->walls = v / 5 % 2;
+    r->area = v / 6 % 2;
     r->scale = 0.001;
     r->evaluate = evaluations[v / 4 % 2];
     r->trunk_layers = 1;
@@ -117,6 +118,7 @@ static void stencil(int v, model_random *r)
     r->fluid_only = 1;
     r->motion = 3;
     r->walls = v / 4 % 2;
+    r->area = v / 5 % 2;
     r->scale = 0.001;
     r->evaluate = evaluations[v / 3 % 2];
 }

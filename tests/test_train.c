@@ -318,6 +318,7 @@ static model_random everything(uint64_t seed, int dimension)
     model_random r = small_basis(seed, dimension);
     r.fluid_only = r.relative = r.damping = r.walls = r.direction = r.transfer = 1;
     r.bumps = 3;
+    r.area = seed / 2 % 2 == 1;
     r.motion = 2;
     r.gravity = 1;
     r.levels = 2;

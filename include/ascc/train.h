@@ -105,7 +105,8 @@ typedef struct ascc_trainer_options {
     int32_t mirror; /* 1: mirror every second rollout in a plane along gravity */
     int32_t whiten; /* the inputs of first layers, for Adam (docs/training.md), as the sequences are
                          at the first iteration: 0 = yes, -1 = no */
-    int32_t relaxation_gradients; /* through a model's relaxation: 0 = exact, -1 = passed on as if there were
+    int32_t
+        relaxation_gradients; /* through a model's relaxation: 0 = exact, -1 = passed on as if there were
                                      none */
 } ascc_trainer_options;
 

@@ -422,8 +422,7 @@ typedef struct reached {
     float first[LANES], second[LANES];
 } reached;
 
-static inline void find_reached(const float *distance, const float *weight, size_t stride,
-                                const uint32_t *neighbor, size_t n, size_t bumps, reached *out)
+static inline void find_reached(const float *distance, size_t bumps, reached *out)
 {
     const vector one = fill(1.0f), zero = fill(0.0f);
     const vector t = times(load(distance), fill((float)bumps));
@@ -431,18 +430,16 @@ static inline void find_reached(const float *distance, const float *weight, size
     const vector f = minus(t, low), g = minus(f, one);
     const vector u = larger(minus(one, times(f, f)), zero);
     const vector v = larger(minus(one, times(g, g)), zero);
-    float scale[LANES];
-    for (size_t l = 0; l < LANES; l++)
-        scale[l] = weight ? weight[neighbor[l < n ? l : 0] * stride] : 1.0f;
     store_whole(out->low, low);
-    store(out->first, times(times(u, u), load(scale)));
-    store(out->second, times(times(v, v), load(scale)));
+    store(out->first, times(u, u));
+    store(out->second, times(v, v));
 }
 
 /* The numbers of eight pairs: 1, direction, speed of approach, and the vector of the neighbour. */
 static inline void pair_numbers(const ascc_pairs *pairs, size_t i, const uint32_t *neighbor,
                                 size_t n, const float *feature, size_t a, const float own[3],
-                                int wall, size_t dimension, vector q[LANES])
+                                int wall, size_t dimension, const float *weight, size_t stride,
+                                vector q[LANES])
 {
     vector v[LANES];
     for (size_t l = 0; l < LANES; l++)
@@ -461,6 +458,13 @@ static inline void pair_numbers(const ascc_pairs *pairs, size_t i, const uint32_
     q[3] = load(pairs->z + i);
     q[4] = minus(fill(0.0f), add(add(times(q[1], relative[0]), times(q[2], relative[1])),
                                  times(q[3], relative[2])));
+    if (weight) {
+        float scale[LANES];
+        for (size_t l = 0; l < LANES; l++)
+            scale[l] = weight[neighbor[i + (l < n ? l : 0)] * stride];
+        for (size_t m = 0; m < 5; m++)
+            q[m] = times(q[m], load(scale));
+    }
     q[5] = v[0];
     q[6] = v[1];
     q[7] = v[2];
@@ -476,8 +480,8 @@ static void moments(const ascc_pairs *pairs, const uint32_t *neighbor, size_t k,
         const size_t n = k - i < LANES ? k - i : LANES;
         vector q[LANES];
         reached r;
-        pair_numbers(pairs, i, neighbor, n, feature, a, own, wall, dimension, q);
-        find_reached(pairs->distance + i, weight, stride, neighbor + i, n, bumps, &r);
+        pair_numbers(pairs, i, neighbor, n, feature, a, own, wall, dimension, weight, stride, q);
+        find_reached(pairs->distance + i, bumps, &r);
         for (size_t l = 0; l < n; l++) {
             float *to = sum + (size_t)r.low[l] * LANES;
             store(to, fused(fill(r.first[l]), q[l], load(to)));

@@ -80,8 +80,8 @@ typedef struct ascc_kernels {
     void (*pair_strengths)(const float *distance, const uint32_t *neighbor, size_t k,
                            const float *center, const float *feature, size_t bumps, float *out);
 
-    /* sum[bump][8] = sum over the pairs j < k in order of weight * bump (as in basis, of the distance) * the
-     * eight numbers 1, x, y, z, w, d[3]. fluid: d = feature[neighbor[j]] - own; wall: d =
+    /* sum[bump][8] = sum over the pairs j < k in order of a bump (as in basis, of the distance) times the
+     * eight numbers 1, x, y, z, w, each times weight, and d[3]. fluid: d = feature[neighbor[j]] - own; wall: d =
      * feature[neighbor[j]]; w, the speed of approach, is -(d . xyz), of a wall own . xyz. One chain of
      * fma a bump. feature rows are a >= 8 apart, of which `dimension` numbers are read (but 8 are loaded);
      * weight[neighbor[j] * stride], NULL = 1. With 2 dimensions z and d[2] are 0. */

@@ -12,7 +12,7 @@
 #define COUNT(list) ((int32_t)(sizeof(list) / sizeof *(list)))
 
 static const char *const evaluations[] = {"current", "advected", "advected_mean"};
-static const char *const features[] = {"one", "velocity", "normal", "motion", "gravity"};
+static const char *const features[] = {"one", "velocity", "normal", "motion", "gravity", "area"};
 static const char *const samplings[] = {"voxel_centers", "voxel_corners", "farthest"};
 static const char *const sampled[] = {"all", "fluid"};
 static const char *const anchors[] = {"world", "centroid"};

@@ -154,6 +154,7 @@ typedef enum ascc_feature {
     ASCC_FEATURE_NORMAL,   /* boundary; dimension channels */
     ASCC_FEATURE_MOTION,   /* velocity in spacings a time step; walls 0; dimension channels */
     ASCC_FEATURE_GRAVITY, /* fluid: the step's, in spacings a squared time step; dimension channels */
+    ASCC_FEATURE_AREA,    /* boundary: what a point stands for, in spacings^(dimension - 1) */
 } ascc_feature;
 
 typedef enum ascc_sampling {
@@ -230,18 +231,34 @@ static inline size_t ascc_padded(int32_t channels)
     return ((size_t)channels + 7) / 8 * 8;
 }
 
-/* First channel of the feature motion of value 0 (fluid) or 1 (boundary), -1 = none. */
-static inline int32_t ascc_plan_motion(const ascc_plan *plan, int32_t value)
+static inline int32_t ascc_feature_channels(int32_t feature, int32_t dimension)
+{
+    return feature == ASCC_FEATURE_ONE || feature == ASCC_FEATURE_AREA ? 1 : dimension;
+}
+
+/* First channel of a feature of value 0 (fluid) or 1 (boundary), -1 = it has none. */
+static inline int32_t ascc_plan_feature(const ascc_plan *plan, int32_t value, ascc_feature wanted)
 {
     const int32_t *feature = value == 0 ? plan->fluid_features : plan->boundary_features;
     const int32_t count = value == 0 ? plan->fluid_feature_count : plan->boundary_feature_count;
     int32_t channel = 0;
     for (int32_t i = 0; i < count; i++) {
-        if (feature[i] == ASCC_FEATURE_MOTION)
+        if (feature[i] == (int32_t)wanted)
             return channel;
-        channel += feature[i] == ASCC_FEATURE_ONE ? 1 : plan->dimension;
+        channel += ascc_feature_channels(feature[i], plan->dimension);
     }
     return -1;
+}
+
+static inline int32_t ascc_plan_motion(const ascc_plan *plan, int32_t value)
+{
+    return ascc_plan_feature(plan, value, ASCC_FEATURE_MOTION);
+}
+
+/* m: within this distance walls count when it is found what each stands for. */
+static inline double ascc_plan_wall_support(const ascc_plan *plan)
+{
+    return plan->relaxation.support > 0.0 ? plan->relaxation.support : 2.0 * plan->spacing;
 }
 
 /* ---- Lengths that follow (plan_lengths.c) ---- */

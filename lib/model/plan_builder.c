@@ -89,12 +89,13 @@ static ascc_status check_features(ascc_plan_builder *builder, const char *whose,
     for (int32_t i = 0; i < count; i++) {
         if (feature[i] != ASCC_FEATURE_ONE && feature[i] != ASCC_FEATURE_MOTION &&
             feature[i] != (int32_t)vector &&
-            !(feature[i] == ASCC_FEATURE_GRAVITY && vector == ASCC_FEATURE_VELOCITY))
+            !(feature[i] == ASCC_FEATURE_GRAVITY && vector == ASCC_FEATURE_VELOCITY) &&
+            !(feature[i] == ASCC_FEATURE_AREA && vector == ASCC_FEATURE_NORMAL))
             return FAIL("a feature that the %s does not have", whose);
         for (int32_t j = 0; j < i; j++)
             if (feature[i] == feature[j])
                 return FAIL("a feature of the %s is given twice", whose);
-        *channels += feature[i] == ASCC_FEATURE_ONE ? 1 : builder->plan.dimension;
+        *channels += ascc_feature_channels(feature[i], builder->plan.dimension);
     }
     return ASCC_OK;
 }

@@ -3,7 +3,8 @@
  * SPDX-License-Identifier: MIT
  *
  * Of a fluid pair: 1, the unit vector to the neighbour, the speed of approach, the difference of velocities;
- * of a wall: 1, the unit vector, the speed of approach, its normal. Galilean invariant by construction.
+ * of a wall: 1, the unit vector, the speed of approach, its normal, each times its area where the boundary has
+ * that feature. Galilean invariant by construction.
  * Channels: [bump][number] of the fluid, then of walls. A particle is a neighbour of its own, at no distance.
  */
 #include <math.h>
@@ -26,16 +27,9 @@ static int32_t numbers(const ascc_plan *plan)
     return 2 + 2 * plan->dimension;
 }
 
-/* First channel of the normals of walls, -1 = none. */
 static int32_t normal_channel(const ascc_plan *plan)
 {
-    int32_t channel = 0;
-    for (int32_t i = 0; i < plan->boundary_feature_count; i++) {
-        if (plan->boundary_features[i] == ASCC_FEATURE_NORMAL)
-            return channel;
-        channel += plan->boundary_features[i] == ASCC_FEATURE_ONE ? 1 : plan->dimension;
-    }
-    return -1;
+    return ascc_plan_feature(plan, 1, ASCC_FEATURE_NORMAL);
 }
 
 static void read_moments(ascc_reader *reader, uint32_t object, const ascc_plan *plan,
@@ -133,6 +127,13 @@ static const float *vectors_of(const ascc_network_run *run, int list, size_t *st
     return run->value[list].raw + (list ? normal_channel(plan) : ascc_plan_motion(plan, 0));
 }
 
+/* What the numbers of a wall count, all but the normal, whose feature has it; NULL = once. */
+static const float *areas_of(const ascc_network_run *run, int list)
+{
+    const int32_t channel = ascc_plan_feature(run->plan, 1, ASCC_FEATURE_AREA);
+    return list && channel >= 0 ? run->value[1].raw + channel : NULL;
+}
+
 /* Moments of one row over one list, [bump][8]. */
 static void sum_row(const ascc_tile *tile, const ascc_term *term, int list, size_t row, float *sum)
 {
@@ -147,8 +148,8 @@ static void sum_row(const ascc_tile *tile, const ascc_term *term, int list, size
     const float own[3] = {motion[0], motion[1], d > 2 ? motion[2] : 0.0f};
     ascc_geometry g;
     ascc_geometry_of(&g, run, rows, &filter, row, neighbor, count, tile->scratch, tile->room);
-    run->tools->kernels->moments(&g.pairs, neighbor, count, vectors, stride, own, list, d, NULL, 0,
-                                 (size_t)filter.bumps, sum);
+    run->tools->kernels->moments(&g.pairs, neighbor, count, vectors, stride, own, list, d,
+                                 areas_of(run, list), stride, (size_t)filter.bumps, sum);
 }
 
 /* The numbers of a bump without those that a plane does not have. */
@@ -218,14 +219,16 @@ static void backward_pair(const ascc_reverse *pass, const ascc_term *term, int l
     size_t stride, own_stride;
     const float *vectors = vectors_of(run, list, &stride) + j * stride;
     const float *own = vectors_of(run, 0, &own_stride) + row * own_stride;
-    double r[3], u[3] = {0.0, 0.0, 0.0}, relative[3] = {0.0, 0.0, 0.0}, q[8] = {1.0};
+    const float *areas = areas_of(run, list);
+    const double area = areas ? (double)areas[j * stride] : 1.0;
+    double r[3], u[3] = {0.0, 0.0, 0.0}, relative[3] = {0.0, 0.0, 0.0}, q[8] = {area};
     ascc_seen_displacement(run, rows, row, j, r);
     const double distance = sqrt(r[0] * r[0] + r[1] * r[1] + r[2] * r[2]);
     for (int32_t c = 0; c < d; c++) {
         u[c] = distance > 0.0 ? r[c] / distance : 0.0;
         relative[c] = (list ? 0.0 : (double)vectors[c]) - (double)own[c];
-        q[1 + c] = u[c];
-        q[4] -= u[c] * relative[c];
+        q[1 + c] = area * u[c];
+        q[4] -= area * u[c] * relative[c];
         q[5 + c] = list ? (double)vectors[c] : relative[c];
     }
     const pair_gradient g =
@@ -233,10 +236,10 @@ static void backward_pair(const ascc_reverse *pass, const ascc_term *term, int l
     double by_u[3] = {0.0, 0.0, 0.0}, along = 0.0, by_r[3] = {0.0, 0.0, 0.0}, back[3];
     float *motion = pass->value[0].raw ? pass->value[0].raw + ascc_plan_motion(run->plan, 0) : NULL;
     for (int32_t c = 0; c < d; c++) {
-        by_u[c] = g.by_number[1 + c] - g.by_number[4] * relative[c];
+        by_u[c] = area * (g.by_number[1 + c] - g.by_number[4] * relative[c]);
         along += by_u[c] * u[c];
         const float by_relative =
-            (float)((list ? 0.0 : g.by_number[5 + c]) - g.by_number[4] * u[c]);
+            (float)((list ? 0.0 : g.by_number[5 + c]) - area * g.by_number[4] * u[c]);
         if (motion)
             motion[row * own_stride + (size_t)c] -= by_relative;
         if (motion && !list)

@@ -336,6 +336,24 @@ static void evaluate(ascc_pair_sum *sum, size_t i, ascc_pair_batch *b)
     ascc_pair_sum_add(sum, i, b, t);
 }
 
+/* Areas of walls, so far apart, in the order of their set; NULL: each counts once. */
+static const float *areas_of(const ascc_network_run *run, size_t *stride)
+{
+    const int32_t channel = ascc_plan_feature(run->plan, 1, ASCC_FEATURE_AREA);
+    *stride = ascc_padded(run->plan->boundary_channels);
+    return channel >= 0 ? run->value[1].raw + channel : NULL;
+}
+
+static void weigh_walls(const ascc_network_run *run, const ascc_pair_batch *b, strengths *s)
+{
+    size_t stride;
+    const float *area = areas_of(run, &stride);
+    for (size_t k = 0; area && k < b->count; k++) {
+        s->strength[k] *= area[b->neighbor[k] * stride];
+        s->damping[k] *= area[b->neighbor[k] * stride];
+    }
+}
+
 static void evaluate_walls(ascc_pair_sum *sum, size_t i, ascc_pair_batch *b)
 {
     static const float nothing[ASCC_MAX_BUMPS];
@@ -345,7 +363,7 @@ static void evaluate_walls(ascc_pair_sum *sum, size_t i, ascc_pair_batch *b)
     const ascc_filter *filter = &run->plan->output.walls;
     float geometry[ASCC_GEOMETRY_ARRAYS * ASCC_PAIR_BATCH];
     double t[3][ASCC_PAIR_BATCH], square[ASCC_PAIR_BATCH];
-    strengths s;
+    strengths s = {.damping = {0.0f}};
     ascc_geometry g;
     ascc_geometry_of(&g, run, sum->rows, filter, i, b->neighbor, b->count, geometry,
                      ASCC_PAIR_BATCH);
@@ -354,6 +372,7 @@ static void evaluate_walls(ascc_pair_sum *sum, size_t i, ascc_pair_batch *b)
             run->tools->kernels->pair_strengths(
                 g.pairs.distance, nobody, b->count, c->part[part] + i * ASCC_MAX_BUMPS, nothing,
                 (size_t)filter->bumps, part == ASCC_TENSOR_WALL ? s.strength : s.damping);
+    weigh_walls(run, b, &s);
     ascc_pair_displacements(sum->rows, NULL, i, b, t, square);
     point_strengths(sum, i, b, &s, c->part[ASCC_TENSOR_WALL_DAMPING] != NULL, false, square, t);
     for (int n = 0; n < 3; n++)
@@ -448,6 +467,7 @@ typedef struct pair {
     double slope, damping_slope;  /* of strength and damping by distance over radius */
     double force[3], relative[3]; /* gradient of the impulse; motion of i less that of j */
     double along;                 /* force . u */
+    double area;                  /* of a wall */
     double total;                 /* the impulse along u, limited */
     bool limited;                 /* then nothing but u changes it */
 } pair;
@@ -500,6 +520,15 @@ static void find_pair(const ascc_pair_reverse *q, int part, const bumps_at *at, 
     a->cosine = q->place && a->both ? ascc_dot3(a->seen, a->u) : 1.0;
     a->strength = strength_of(q, part, a->i, a->j, a->both, at, &a->slope);
     a->damping = strength_of(q, part + 1, a->i, a->j, a->both, at, &a->damping_slope);
+    if (!a->both) {
+        size_t stride;
+        const float *area = areas_of(p->run, &stride);
+        a->area = area ? (double)area[a->j * stride] : 1.0;
+        a->strength *= a->area;
+        a->slope *= a->area;
+        a->damping *= a->area;
+        a->damping_slope *= a->area;
+    }
     a->along = ascc_dot3(a->force, a->u);
     a->approach = 0.0;
     if (((const gradients *)q->data)->c.part[part + 1]) {
@@ -528,6 +557,7 @@ static void pass_pair(const ascc_pair_reverse *q, int part, const ascc_filter *f
     pair a = {.i = i,
               .j = j,
               .both = both,
+              .area = 1.0,
               .distance = sqrt(ascc_dot3(r, r)),
               .length = sqrt(ascc_dot3(d, d))};
     if (a.length == 0.0)
@@ -535,8 +565,8 @@ static void pass_pair(const ascc_pair_reverse *q, int part, const ascc_filter *f
     const bumps_at at = find_bumps(a.distance / filter->radius, filter->bumps);
     find_pair(q, part, &at, r, d, &a);
     for (int side = 0; side < (both ? 2 : 1) && !a.limited; side++) {
-        add_share(q, part, side ? j : i, &at, a.cosine * a.along);
-        add_share(q, part + 1, side ? j : i, &at, -a.approach * a.along);
+        add_share(q, part, side ? j : i, &at, a.area * a.cosine * a.along);
+        add_share(q, part + 1, side ? j : i, &at, -a.area * a.approach * a.along);
     }
     if (((const gradients *)q->data)->c.part[part + 1] && p->value[0].raw) {
         const size_t width = ascc_padded(plan->fluid_channels);

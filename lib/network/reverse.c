@@ -186,7 +186,7 @@ static void add_velocities(const ascc_reverse *p)
             const bool moves = feature != ASCC_FEATURE_ONE && feature != ASCC_FEATURE_GRAVITY;
             for (size_t c = 0; moves && c < d; c++)
                 to[c] += factor * (double)g[c];
-            g += feature == ASCC_FEATURE_ONE ? 1 : d;
+            g += ascc_feature_channels(feature, plan->dimension);
         }
     }
 }

@@ -3,15 +3,17 @@
 #include "stage.h"
 
 /* vector: m/s of fluid, a normal of boundary, in units of `factor`; motion: the factor that makes of it
- * spacings a time step; gravity: in spacings a squared time step. */
+ * spacings a time step; gravity: in spacings a squared time step; area: of boundary. */
 static void features_of(const ascc_plan *plan, const int32_t *feature, int32_t feature_count,
                         const double *vector, double factor, double motion, const double *gravity,
-                        float *to)
+                        double area, float *to)
 {
     for (int32_t f = 0; f < feature_count; f++) {
         const double scale = feature[f] == ASCC_FEATURE_MOTION ? motion : factor;
         if (feature[f] == ASCC_FEATURE_ONE)
             *to++ = 1.0f;
+        else if (feature[f] == ASCC_FEATURE_AREA)
+            *to++ = (float)area;
         else if (feature[f] == ASCC_FEATURE_GRAVITY)
             for (int32_t c = 0; c < plan->dimension; c++)
                 *to++ = (float)gravity[c];
@@ -19,6 +21,17 @@ static void features_of(const ascc_plan *plan, const int32_t *feature, int32_t f
             for (int32_t c = 0; c < plan->dimension; c++)
                 *to++ = (float)(vector[c] * scale);
     }
+}
+
+/* The area of a plane (the length of a line) that the spline weighs in all, in spacings; 0 = areas are not wanted.
+ * A point has its share of it: the sum of these is the same however dense points are. */
+static double whole_area(const ascc_plan *plan)
+{
+    static const double pi = 3.14159265358979323846;
+    const double support = ascc_plan_wall_support(plan) / plan->spacing;
+    if (ascc_plan_feature(plan, 1, ASCC_FEATURE_AREA) < 0)
+        return 0.0;
+    return plan->dimension == 2 ? 0.75 * support : 7.0 * pi / 40.0 * support * support;
 }
 
 /* Features of all particles in the host's order; vectors in metres. */
@@ -34,17 +47,31 @@ static bool lend_features(ascc_step_state *state)
     if (!state->fluid_features || !state->boundary_features)
         return false;
     const double unit = state->length_unit, motion = unit * plan->time_step / plan->spacing;
+    const double whole = whole_area(plan);
     double gravity[3] = {0.0, 0.0, 0.0};
     for (size_t c = 0; c < d; c++)
         gravity[c] = state->motion->gravity[c] * plan->time_step * motion;
     for (size_t i = 0; i < p->fluid_count; i++)
         features_of(plan, plan->fluid_features, plan->fluid_feature_count,
-                    state->advance.velocity + i * d, unit, motion, gravity,
+                    state->advance.velocity + i * d, unit, motion, gravity, 0.0,
                     state->fluid_features + i * fluid);
-    for (size_t i = 0; i < p->boundary_count; i++)
+    for (size_t i = 0; i < p->boundary_count; i++) {
+        const double area = whole > 0.0 ? whole * (double)state->walls->volume[i] : 1.0;
         features_of(plan, plan->boundary_features, plan->boundary_feature_count,
-                    p->wall_normal + i * d, 1.0, 0.0, gravity, state->boundary_features + i * wall);
+                    p->wall_normal + i * d, area, 0.0, gravity, area,
+                    state->boundary_features + i * wall);
+    }
     return true;
+}
+
+/* What the walls stand for, if the network wants to know. */
+static ascc_status find_areas(ascc_step_state *state)
+{
+    const ascc_plan *plan = state->network->plan;
+    if (ascc_plan_feature(plan, 1, ASCC_FEATURE_AREA) < 0)
+        return ASCC_OK;
+    return ascc_wall_volumes_update(state->walls, &state->tools, state->particles,
+                                    ascc_plan_wall_support(plan) / state->length_unit);
 }
 
 typedef struct scale_job {
@@ -80,6 +107,9 @@ ascc_status ascc_stage_sight(ascc_step_state *state)
                         .velocity = state->advance.velocity,
                         .mass = p->mass,
                         .normal = p->wall_normal};
+    ascc_status status = find_areas(state);
+    if (status != ASCC_OK)
+        return status;
     state->before_features = ascc_arena_mark_of(tools->arena);
     const bool room = lend_features(state);
     const ascc_arena_mark before_scene = ascc_arena_mark_of(tools->arena);
@@ -87,8 +117,7 @@ ascc_status ascc_stage_sight(ascc_step_state *state)
     scene.boundary = scaled(tools, p->wall_position, p->boundary_count * d, state->length_unit);
     if (!room || !scene.fluid || !scene.boundary)
         return ascc_fail(tools->message, ASCC_ERROR_MEMORY, "no memory for the features");
-    const ascc_status status =
-        ascc_hierarchy_build(&state->hierarchy, tools, state->network->plan, &scene);
+    status = ascc_hierarchy_build(&state->hierarchy, tools, state->network->plan, &scene);
     ascc_arena_return(tools->arena, before_scene);
     return status;
 }

@@ -467,13 +467,13 @@ static void add_head(random_network *n)
                    "{\"name\":\"random\",\"description\":\"random weights, for tests\","
                    "\"dimension\":%d,\"time_step\":%s,\"gravity\":[0,-9.8125%s],"
                    "\"particle_spacing\":%s,\"rest_density\":1000,\"evaluate\":\"%s\","
-                   "\"features\":{\"fluid\":[%s%s],\"boundary\":[\"one\",\"normal\"%s]}",
+                   "\"features\":{\"fluid\":[%s%s],\"boundary\":[\"%s\",\"normal\"%s]}",
                    o->dimension, model_number(0.005), third, model_number(o->spacing), o->evaluate,
                    o->motion == 3   ? "\"one\",\"motion\""
                    : o->motion == 2 ? "\"motion\",\"one\""
                    : o->motion == 1 ? "\"one\",\"velocity\",\"motion\""
                                     : "\"one\",\"velocity\"",
-                   o->gravity ? ",\"gravity\"" : "",
+                   o->gravity ? ",\"gravity\"" : "", o->area ? "area" : "one",
                    o->motion && o->motion < 3 ? ",\"motion\"" : "");
     if (o->boundary_crop > 0.0)
         model_text_add(&n->text, ",\"boundary_crop\":%s",

@@ -115,6 +115,14 @@ static point_set sample_voxels(const ascc_plan *plan, const point_set *all, doub
     return set;
 }
 
+static double distance(const double *a, const double *b, size_t d)
+{
+    double square = 0.0;
+    for (size_t c = 0; c < d; c++)
+        square += (a[c] - b[c]) * (a[c] - b[c]);
+    return sqrt(square);
+}
+
 static double square_distance(const double a[3], const double b[3])
 {
     double square = 0.0;
@@ -383,7 +391,8 @@ static int32_t motion_channel(const int32_t *feature, int32_t count, int dimensi
     for (int32_t f = 0; f < count; f++) {
         if (feature[f] == ASCC_FEATURE_MOTION)
             return channel;
-        channel += feature[f] == ASCC_FEATURE_ONE ? 1 : dimension;
+        channel +=
+            feature[f] == ASCC_FEATURE_ONE || feature[f] == ASCC_FEATURE_AREA ? 1 : dimension;
     }
     return -1;
 }
@@ -469,6 +478,13 @@ static void convolve(const network_state *n, const ascc_layer *layer, const ascc
 }
 
 /* Pair moments over one list: fluid, or (wall) the boundary. */
+/* What a wall stands for, from its feature, which boundary features begin with: 1 without. */
+static double area_of(const network_state *n, size_t wall)
+{
+    const bool known = n->o->model->plan.boundary_features[0] == ASCC_FEATURE_AREA;
+    return known ? read_value(n, 1, false, wall, 0) : 1.0;
+}
+
 static double *add_moments_of(const network_state *n, bool wall, double radius, int bumps,
                               size_t row, double *out)
 {
@@ -476,7 +492,7 @@ static double *add_moments_of(const network_state *n, bool wall, double radius, 
     const point_set *set = &n->sets->set[wall ? ASCC_SET_BOUNDARY : ASCC_SET_FLUID];
     const point *query = &n->sets->set[ASCC_SET_FLUID].point[row];
     const int d = plan->dimension;
-    const int32_t normal = plan->boundary_features[0] == ASCC_FEATURE_ONE ? 1 : 0;
+    const int32_t normal = plan->boundary_features[0] == ASCC_FEATURE_NORMAL ? 0 : 1;
     for (size_t j = 0; j < set->count; j++) {
         double r[3], q[8] = {1.0}, relative[3];
         const double length = displacement(&set->point[j], query, r);
@@ -490,7 +506,8 @@ static double *add_moments_of(const network_state *n, bool wall, double radius, 
         }
         for (int k = 0; length < radius && k < bumps; k++)
             for (int m = 0; m < 2 + 2 * d; m++)
-                out[k * (2 + 2 * d) + m] += bump_at(bumps, k, length / radius) * q[m];
+                out[k * (2 + 2 * d) + m] += bump_at(bumps, k, length / radius) * q[m] *
+                                            (wall && m < 2 + d ? area_of(n, j) : 1.0);
     }
     return out + bumps * (2 + 2 * d);
 }
@@ -643,18 +660,39 @@ static void run_layer(network_state *n, int32_t l)
 }
 
 static void set_features(const ascc_plan *plan, const int32_t *feature, int32_t count,
-                         const double *vector, const double *gravity, bool wall, double *to)
+                         const double *vector, const double *gravity, bool wall, double area,
+                         double *to)
 {
     for (int32_t f = 0; f < count; f++)
         if (feature[f] == ASCC_FEATURE_ONE)
             *to++ = 1.0;
+        else if (feature[f] == ASCC_FEATURE_AREA)
+            *to++ = area;
         else
             for (int c = 0; c < plan->dimension; c++)
                 *to++ = feature[f] == ASCC_FEATURE_GRAVITY
                             ? gravity[c] * plan->time_step * plan->time_step / plan->spacing
-                        : feature[f] != ASCC_FEATURE_MOTION ? vector[c]
+                        : feature[f] != ASCC_FEATURE_MOTION ? vector[c] * area
                         : wall                              ? 0.0
                                : vector[c] * plan->time_step / plan->spacing;
+}
+
+/* The share of the area that the spline weighs, in spacings^(dimension - 1), if the features have it. */
+static double wall_area(const oracle *o, size_t wall)
+{
+    const ascc_plan *plan = &o->model->plan;
+    const size_t d = (size_t)plan->dimension;
+    const double support =
+        plan->relaxation.pressure.count ? plan->relaxation.support : 2.0 * plan->spacing;
+    const double whole = d == 2 ? 3.0 / 4.0 : 7.0 / 40.0 * acos(-1.0);
+    double sum = 0.0;
+    if (plan->boundary_features[0] != ASCC_FEATURE_AREA)
+        return 1.0;
+    for (size_t i = 0; i < o->wall_count; i++) {
+        const double q = distance(o->wall + wall * d, o->wall + i * d, d) / support;
+        sum += q < 1.0 ? 2.0 * pow(1.0 - q, 3.0) - 8.0 * pow(fmax(0.0, 0.5 - q), 3.0) : 0.0;
+    }
+    return whole * pow(support / plan->spacing, (double)d - 1.0) / sum;
 }
 
 static void run_layers(network_state *n, const double *velocity)
@@ -666,11 +704,11 @@ static void run_layers(network_state *n, const double *velocity)
     n->value[1] = make_values(n, ASCC_SET_BOUNDARY, plan->boundary_channels);
     for (size_t i = 0; i < o->fluid_count; i++)
         set_features(plan, plan->fluid_features, plan->fluid_feature_count, velocity + i * d,
-                     o->gravity, false, n->value[0].row + i * (size_t)plan->fluid_channels);
+                     o->gravity, false, 1.0, n->value[0].row + i * (size_t)plan->fluid_channels);
     for (size_t i = 0; i < n->sets->set[ASCC_SET_BOUNDARY].count; i++) {
         const size_t wall = n->sets->set[ASCC_SET_BOUNDARY].point[i].particle - o->fluid_count;
         set_features(plan, plan->boundary_features, plan->boundary_feature_count,
-                     o->normal + wall * d, o->gravity, true,
+                     o->normal + wall * d, o->gravity, true, wall_area(o, wall),
                      n->value[1].row + i * (size_t)plan->boundary_channels);
     }
     for (int32_t l = 0; l < plan->layer_count; l++)
@@ -792,9 +830,9 @@ static void correct_particle(const network_state *n, size_t i, double *correctio
                      output->term.tensor[ASCC_TENSOR_DAMPING], f, d, i, j,
                      wall ? set->point[j].x : NULL, correction);
     }
-    for (int32_t a = 0; a < output->term.inputs; a++)
-        f[a] = read_value(n, output->term.source, rectify, i, a);
     for (size_t j = 0; output->has_walls && j < walls->count; j++) {
+        for (int32_t a = 0; a < output->term.inputs; a++)
+            f[a] = area_of(n, j) * read_value(n, output->term.source, rectify, i, a);
         displacement(&walls->point[j], &set->point[i], d);
         central_pair(n, &output->walls, output->term.tensor[ASCC_TENSOR_WALL],
                      output->term.tensor[ASCC_TENSOR_WALL_DAMPING], f, d, i, NOBODY,
@@ -937,14 +975,6 @@ static double percentile(double *value, size_t count, double share, double bin)
     while (rank + 1 < count && (double)(rank + 1) < share * (double)count)
         rank++;
     return (floor(value[rank] / bin) + 0.5) * bin;
-}
-
-static double distance(const double *a, const double *b, size_t d)
-{
-    double square = 0.0;
-    for (size_t c = 0; c < d; c++)
-        square += (a[c] - b[c]) * (a[c] - b[c]);
-    return sqrt(square);
 }
 
 static double density_of(const oracle *o, const double *x, size_t i)

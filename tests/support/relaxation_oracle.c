@@ -103,7 +103,7 @@ static void correction(const scene *s, size_t i, size_t k, double repulsion, dou
 /* move = what the sweeps against this excess push. repulsion < 0: of velocities. */
 static void sweep(scene *s, const ascc_sweeps *sweeps, const double excess[MOST], double repulsion)
 {
-    double next[MOST];
+    double next[MOST] = {0.0};
     memset(s->p, 0, sizeof s->p);
     memset(s->move, 0, sizeof s->move);
     for (int32_t n = 0; n < sweeps->count; n++) {
