@@ -396,12 +396,16 @@ static void gradients_through_the_relaxation_are_right(void **state)
                        v % 4 ? ",\"divergence\":[0.5,0.5,0.3]" : "",
                        v / 2 % 2 ? ",\"direction\":\"current\"" : "",
                        v % 3 ? ",\"repulsion\":{\"distance\":0.04,\"stiffness\":0.7}" : "");
+        if (v > 4)
+            (void)snprintf(text + strlen(text) - 1, sizeof text - strlen(text) + 1,
+                           ",\"guess\":\"guess\"}");
         gradient_case c = {.name = "relaxation",
                            .random = everything(1800 + (uint64_t)v, d),
                            .unroll = 1 + v % 3,
                            .constant_positions = v / 3 % 2,
                            .samples = 24};
         c.random.relaxation = text;
+        c.random.guess = v > 4;
         worst = fmax(worst, check_gradient(&c));
     }
     print_message("# relaxation: %.2g\n", worst);

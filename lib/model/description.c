@@ -296,7 +296,7 @@ ascc_status ascc_description_read(ascc_plan_builder *builder, const char *text)
     } else {
         read_head(builder, &reader);
         read_layers(builder, &reader);
-        ascc_relaxation_read(&reader, 0, &builder->plan);
+        ascc_relaxation_read(&reader, 0, builder);
         read_output(builder, &reader);
         ascc_reader_where(&reader, "network");
         ascc_reader_end(&reader, 0);

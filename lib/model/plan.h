@@ -141,7 +141,9 @@ typedef struct ascc_relaxation {
     double repulsion, stiffness; /* pairs nearer than this, m, part by this share of the lack */
     double contact;              /* as of an output, for a model that has none there; m */
     int32_t current_direction;   /* corrections are turned to the lines before the step */
-    int32_t reserved;
+    int32_t
+        guess; /* value that pressures begin with, rectified, in units of 1 / D of a lattice at rest; 0 =
+                      none: they begin with 0 */
     /* What follows: */
     double reach;            /* of the neighbour lists, m */
     double amount;           /* the spline's middle times rest_volume */

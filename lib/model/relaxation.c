@@ -105,9 +105,24 @@ static void read_sweeps(ascc_reader *reader, uint32_t object, const char *key, a
                          key);
 }
 
-void ascc_relaxation_read(ascc_reader *reader, uint32_t object, ascc_plan *plan)
+/* The value that pressures begin with. */
+static int32_t read_guess(ascc_reader *reader, uint32_t object, const ascc_plan_builder *builder)
+{
+    const char *name = ascc_reader_text(reader, object, "guess");
+    const int32_t value = reader->status == ASCC_OK ? ascc_plan_find_value(builder, name) : -1;
+    const ascc_layer *layer = value >= 2 ? &builder->layer[value - 2] : NULL;
+    if (reader->status == ASCC_OK &&
+        (!layer || layer->set != ASCC_SET_FLUID || layer->channels != 1))
+        ascc_reader_fail(reader,
+                         "'guess' is '%s', not a layer of one channel on the points 'fluid'",
+                         ascc_quote(name).text);
+    return value;
+}
+
+void ascc_relaxation_read(ascc_reader *reader, uint32_t object, ascc_plan_builder *builder)
 {
     static const char *const directions[] = {"current"};
+    ascc_plan *plan = &builder->plan;
     if (!ascc_reader_has(reader, object, "relaxation"))
         return;
     const uint32_t o = ascc_reader_object(reader, object, "relaxation");
@@ -122,6 +137,8 @@ void ascc_relaxation_read(ascc_reader *reader, uint32_t object, ascc_plan *plan)
         read_sweeps(reader, o, "divergence", &r.divergence);
     if (ascc_reader_has(reader, o, "direction"))
         r.current_direction = 1 + ascc_reader_choice(reader, o, "direction", directions, 1);
+    if (ascc_reader_has(reader, o, "guess"))
+        r.guess = read_guess(reader, o, builder);
     if (ascc_reader_has(reader, o, "contact"))
         r.contact = ascc_reader_number(reader, o, "contact", 0.0, r.support);
     if (ascc_reader_has(reader, o, "repulsion")) {

@@ -4,9 +4,10 @@
 #define ASCC_MODEL_RELAXATION_H
 
 #include "file/json_reader.h"
-#include "plan.h"
+#include "plan_builder.h"
 
-/* Reads the member `relaxation` of the description, if it is there, and finds what follows from it. */
-void ascc_relaxation_read(ascc_reader *reader, uint32_t object, ascc_plan *plan);
+/* Reads the member `relaxation` of the description, if it is there, and finds what follows from it. The layers
+ * are known. */
+void ascc_relaxation_read(ascc_reader *reader, uint32_t object, ascc_plan_builder *builder);
 
 #endif

@@ -101,6 +101,8 @@ ascc_status ascc_network_create(ascc_network *network, const ascc_allocator *all
         for (int32_t t = 0; t < plan->layer[l].term_count; t++)
             prepare_term(network, plan->layer[l].first_term + t, plan->layer[l].set);
     prepare_term(network, plan->term_count, ascc_network_set(network, plan->output.term.source));
+    if (plan->relaxation.guess)
+        network->wants[plan->relaxation.guess] |= ASCC_WANTS_RECTIFIED;
     for (int i = 0; i < 2; i++)
         network->relaxation_key[i] =
             plan->relaxation.pressure.count
@@ -255,6 +257,8 @@ static ascc_status demand_output(ascc_network_run *run)
     uint8_t *active = run->value[source].active;
     for (size_t i = 0; i < h->fluid_count; i++)
         active[set == ASCC_SET_FLUID ? i : h->whole[ASCC_SET_FLUID][i]] = 1;
+    if (run->plan->relaxation.guess)
+        memset(run->value[run->plan->relaxation.guess].active, 1, h->set[ASCC_SET_FLUID].count);
     if (key[0] < 0)
         return ASCC_OK;
     uint8_t *fluid = ascc_arena_lend(run->tools->arena, h->set[set].count, 1);

@@ -169,6 +169,16 @@ static ascc_status pass_layer(ascc_reverse *p, int32_t l)
     return ASCC_OK;
 }
 
+/* From the pressures that a relaxation begins with to the value that they are. */
+static void add_guesses(const ascc_reverse *p)
+{
+    const ascc_hierarchy *h = p->run->hierarchy;
+    float *to = p->value[p->run->plan->relaxation.guess].rectified;
+    for (size_t i = 0; i < h->set[ASCC_SET_FLUID].count; i++)
+        to[i * ascc_padded(1)] +=
+            (float)p->pass->guess[ascc_hierarchy_host_row(h, ASCC_SET_FLUID, i)];
+}
+
 /* From features to the velocities they were made of. */
 static void add_velocities(const ascc_reverse *p)
 {
@@ -202,6 +212,8 @@ ascc_status ascc_backward_run(const ascc_backward *pass)
     if (!take_gradients(&p))
         return ASCC_ERROR_MEMORY;
     ascc_status status = plan->output.term.operation->backward_output(&p);
+    if (plan->relaxation.guess && pass->guess)
+        add_guesses(&p);
     for (int32_t l = plan->layer_count - 1; l >= 0 && status == ASCC_OK; l--)
         status = pass_layer(&p, l);
     if (status == ASCC_OK && pass->velocity && (p.value[0].raw || p.value[0].rectified))

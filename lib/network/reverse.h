@@ -30,6 +30,7 @@ typedef struct ascc_backward {
     double time_step;         /* s */
     const double *position;   /* before the step */
     const double *correction; /* gradient of the velocity corrections, per m/s */
+    const double *guess;      /* [host's fluid rows] of what pressures begin with; or NULL */
     float *packed;            /* += gradient of the packed weights */
     double *velocity;         /* += gradient of the velocities seen, per m/s; or NULL */
     double *seen, *place; /* += gradient of positions seen and before the step, per m; or NULL */

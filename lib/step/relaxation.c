@@ -5,7 +5,7 @@
  *
  *     d_i = - sum_j (p_i + p_j) g_ij - sum_walls p_i g_ib                  push
  *     c_i = excess_i + sum_j g_ij . (d_i - d_j) + sum_walls g_ib . d_i     divergence
- *     p_i = max(0, p_i + omega c_i / (D_i + epsilon D_lattice))
+ *     p_i = max(0, p_i + omega c_i / (D_i + epsilon D_lattice))          from 0, or a channel of the network
  *
  * Geometry stays as it is while sweeps go on; d is applied once, at the end, as pair impulses. The
  * same sweeps on velocities, with their divergence in place of the excess, end their approach.
@@ -41,6 +41,7 @@ typedef struct relaxation {
     float *own[3];  /* sum of g, walls included */
     float *push[3]; /* the same by weight */
     float *excess, *response, *pressure, *change, *move[3];
+    const float *guess;  /* [count][padded] of pressures, times D_lattice; NULL = 0 */
     const double *place; /* [count][3] before the step, if corrections lie along those lines */
     float *scratch;      /* [slots][4][room] */
     size_t room;
@@ -305,7 +306,16 @@ static void relax_rows(void *data, size_t begin, size_t end, int32_t slot)
     }
 }
 
-/* The first of all sweeps: nothing has moved yet. */
+static void guess_rows(void *data, size_t begin, size_t end, int32_t slot)
+{
+    (void)slot;
+    relaxation *r = data;
+    const float unit = (float)(1.0 / r->constants->lattice_response);
+    for (size_t i = begin; i < end; i++)
+        r->pressure[i] = unit * r->guess[i * ascc_padded(1)];
+}
+
+/* The first sweep of all without a guess: nothing has moved yet. */
 static void begin_rows(void *data, size_t begin, size_t end, int32_t slot)
 {
     (void)slot;
@@ -320,9 +330,11 @@ static void begin_rows(void *data, size_t begin, size_t end, int32_t slot)
 static void sweep(relaxation *r, const ascc_sweeps *sweeps)
 {
     ascc_workers *workers = r->state->tools.workers;
+    if (r->guess)
+        ascc_workers_run(workers, r->count, 16 * ROWS, guess_rows, r);
     for (int32_t k = 0; k < sweeps->count; k++) {
         r->omega = (float)sweeps->omega[k];
-        if (k > 0) {
+        if (k > 0 || r->guess) {
             ascc_workers_run(workers, r->count, ROWS, push_rows, r);
             ascc_workers_run(workers, r->count, ROWS, relax_rows, r);
         } else {
@@ -566,6 +578,8 @@ static ascc_status relax(ascc_step_state *state, relaxation *r, int64_t *given)
     if (status != ASCC_OK)
         return status;
     r->repulsion = (float)(r->constants->repulsion / r->constants->support);
+    if (r->constants->guess)
+        r->guess = state->run.value[r->constants->guess].rectified;
     memset(r->change, 0, r->count * sizeof *r->change);
     measure(r, &s->compression_before);
     sweep(r, &r->constants->pressure);

@@ -199,6 +199,22 @@ static void divergence(const reverse *r, const double *move, double *to)
     }
 }
 
+/* Pressures begin with a value of the network, in its units. */
+static void guess(reverse *r)
+{
+    const int32_t value = r->constants->guess;
+    for (size_t i = 0; value && i < r->count; i++)
+        r->pressure[i] = (double)r->state->run.value[value].rectified[i * ascc_padded(1)] /
+                         r->constants->lattice_response;
+}
+
+static void guess_back(const reverse *r, double *by_guess)
+{
+    for (size_t i = 0; r->constants->guess && i < r->count; i++)
+        by_guess[ascc_hierarchy_host_row(&r->state->hierarchy, ASCC_SET_FLUID, i)] =
+            r->by_pressure[i] / r->constants->lattice_response;
+}
+
 static void sweep(reverse *r)
 {
     for (int32_t s = 0; s < r->sweeps->count; s++) {
@@ -447,10 +463,12 @@ static ascc_status pressure_back(const ascc_step_state *state, ascc_arena *arena
         r.before = line;
     }
     r.repulsion = r.constants->repulsion / r.constants->support;
+    guess(&r);
     sweep(&r);
     apply_back(&r, by);
     for (int32_t s = r.sweeps->count; s > 0; s--)
         sweep_back(&r, s - 1);
+    guess_back(&r, gradients->by_guess);
     geometry_back(&r, true);
     scatter(&r, r.by_place, r.unit, gradients->position);
     scatter(&r, r.by_before, r.unit, gradients->by_before);

@@ -9,7 +9,9 @@
 typedef struct ascc_relaxation_gradients {
     const double *before;        /* positions that the step began with */
     double *position, *velocity; /* by what the step left; then by what the network left */
-    double *by_before;           /* += gradient of `before`, which corrections may lie along */
+    double *
+        by_guess; /* [host's fluid rows] = of the value that pressures begin with, if there is one */
+    double *by_before; /* += gradient of `before`, which corrections may lie along */
 } ascc_relaxation_gradients;
 
 /* Of a step that kept what its relaxation began with (ascc_step_state.keeps_relaxed). Exact but where sweeps

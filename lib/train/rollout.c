@@ -64,6 +64,7 @@ typedef struct rollout {
     double *state;     /* [unroll + 1] positions before each step, and after the last */
     int64_t *momentum; /* [unroll] before each step */
     double *by_position, *by_velocity, *seen, *place, *velocity;
+    double *by_guess;   /* [fluid] */
     size_t first_frame; /* of the first step with gradient: state 0 is there */
 } rollout;
 
@@ -71,12 +72,13 @@ static bool take_memory(rollout *r)
 {
     ascc_rollout_worker *w = r->worker;
     const size_t states = (size_t)r->task->unroll + 1, n = r->numbers;
-    const size_t count = 2 * r->walls + n + 2 * states * n + 5 * n;
+    const size_t count = 2 * r->walls + n + 2 * states * n + 6 * n;
     void *memory = w->memory;
     if (!ascc_grow(&w->context->allocator, &memory, &w->memory_count, count, sizeof *w->memory))
         return false;
     double *at = w->memory = memory;
-    double **const part[] = {&r->by_position, &r->by_velocity, &r->seen, &r->place, &r->velocity};
+    double **const part[] = {&r->by_position, &r->by_velocity, &r->seen,
+                             &r->place,       &r->velocity,    &r->by_guess};
     r->wall = at;
     r->normal = at += r->walls;
     r->truth = at += r->walls;
@@ -217,10 +219,11 @@ static ascc_status step_back(rollout *r, size_t t, const ascc_step_state *state,
     ascc_rollout_worker *w = r->worker;
     const size_t n = r->numbers;
     const double dt = r->motion.time_step;
-    memset(r->seen, 0, 3 * n * sizeof *r->seen); /* seen, place, velocity lie together */
+    memset(r->seen, 0, 4 * n * sizeof *r->seen); /* seen, place, velocity, by_guess lie together */
     const ascc_relaxation_gradients relaxed = {.before = r->state + t * n,
                                                .position = r->by_position,
                                                .velocity = r->by_velocity,
+                                               .by_guess = r->by_guess,
                                                .by_before = r->place};
     if (r->task->relaxation_gradients &&
         ascc_relaxation_backward(state, &w->scratch, &relaxed) != ASCC_OK)
@@ -237,6 +240,7 @@ static ascc_status step_back(rollout *r, size_t t, const ascc_step_state *state,
                                 .time_step = w->step->time_step,
                                 .position = r->state + t * n,
                                 .correction = r->by_velocity,
+                                .guess = r->by_guess,
                                 .packed = packed,
                                 .velocity = first ? NULL : r->velocity,
                                 .seen = places ? r->seen : NULL,

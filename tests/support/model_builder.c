@@ -584,6 +584,15 @@ static unsigned char *random_file(const model_random *options, const char *netwo
         add_first_layer(&n);
     for (int layer = 1; layer <= o->trunk_layers; layer++)
         add_trunk_layer(&n, layer);
+    if (o->guess) {
+        char last[16];
+        snprintf(last, sizeof last, "l%d.0", o->trunk_layers);
+        model_text_add(&n.text,
+                       ",{\"name\":\"guess\",\"points\":\"fluid\",\"channels\":1,\"terms\":[");
+        n.terms = 0;
+        add_dense(&n, "guess", last, 1, 0, o->channels, 1);
+        model_text_add(&n.text, "]}");
+    }
     add_output(&n);
     model_builder_metadata(&n.builder, "format", "ascc.model");
     model_builder_metadata(&n.builder, "version", "1");

@@ -86,6 +86,7 @@ typedef struct model_random {
     int lattice; /* 1: with moments, levels 3, motion 3: a trunk of stencils on lattices where fluid is */
     int moments; /* bumps of a first layer of pair moments, walls' one more; fluid_only, motion */
     int area;    /* 1: the boundary's feature area in place of one */
+    int guess;   /* 1: a layer "guess" of one channel for the relaxation */
     const char *relaxation; /* JSON object; NULL = none */
     int direction; /* 1: the last layer's pairs act along their present line; bumps, fluid_only */
     const char *residual; /* type and members of a layer's residual; NULL = identity */

@@ -858,6 +858,18 @@ static void run_output(const network_state *n, double *correction)
 
 /* ---- A step ---- */
 
+static void relax(const network_state *n, const double *before, double *position, double *velocity)
+{
+    const oracle *o = n->o;
+    const int32_t value = o->model->plan.relaxation.guess;
+    double *guess = take(o->fluid_count, sizeof *guess);
+    for (size_t i = 0; value && i < o->fluid_count; i++)
+        guess[i] = read_value(n, value, true, i, 0);
+    relaxation_oracle(&o->model->plan, o->fluid_count, o->wall_count, o->wall, before,
+                      value ? guess : NULL, position, velocity);
+    free(guess);
+}
+
 void oracle_step(oracle *o, double *position, double *velocity, double *correction)
 {
     const ascc_plan *plan = &o->model->plan;
@@ -886,7 +898,7 @@ void oracle_step(oracle *o, double *position, double *velocity, double *correcti
             correction[k] = moved[k];
     }
     if (plan->relaxation.pressure.count)
-        relaxation_oracle(plan, o->fluid_count, o->wall_count, o->wall, before, position, velocity);
+        relax(&n, before, position, velocity);
     for (int32_t v = 0; v < plan->layer_count + 2; v++)
         free(n.value[v].row);
     free(n.value);

@@ -100,22 +100,27 @@ static void correction(const scene *s, size_t i, size_t k, double repulsion, dou
         to[c] = square > 0.0 ? along / square * line[c] : 0.0;
 }
 
-/* move = what the sweeps against this excess push. repulsion < 0: of velocities. */
+/* move = what the pressures push. */
+static void push(scene *s)
+{
+    memset(s->move, 0, sizeof s->move);
+    for (size_t i = 0; i < s->fluid; i++)
+        for (size_t k = 0; k < s->all; k++)
+            for (size_t c = 0; c < 3; c++)
+                s->move[i][c] -= (s->p[i] + (k < s->fluid ? s->p[k] : 0.0)) * s->g[i][k][c];
+}
+
+/* move = what the sweeps against this excess push, pressures as they are at first. repulsion < 0: of
+ * velocities. */
 static void sweep(scene *s, const ascc_sweeps *sweeps, const double excess[MOST], double repulsion)
 {
     double next[MOST] = {0.0};
-    memset(s->p, 0, sizeof s->p);
-    memset(s->move, 0, sizeof s->move);
     for (int32_t n = 0; n < sweeps->count; n++) {
+        push(s);
         for (size_t i = 0; i < s->fluid; i++)
             next[i] = fmax(0.0, s->p[i] + sweeps->omega[n] * s->response[i] *
                                               (excess[i] + divergence(s, i)));
         memcpy(s->p, next, sizeof next);
-        memset(s->move, 0, sizeof s->move);
-        for (size_t i = 0; i < s->fluid; i++)
-            for (size_t k = 0; k < s->all; k++)
-                for (size_t c = 0; c < 3; c++)
-                    s->move[i][c] -= (s->p[i] + (k < s->fluid ? s->p[k] : 0.0)) * s->g[i][k][c];
     }
     memset(s->move, 0, sizeof s->move);
     for (size_t i = 0; i < s->fluid; i++)
@@ -144,6 +149,7 @@ static void relax_velocities(scene *s, double step, double *velocity)
     }
     for (size_t i = 0; i < s->fluid; i++)
         excess[i] = divergence(s, i);
+    memset(s->p, 0, sizeof s->p);
     sweep(s, &s->constants->divergence, excess, -1.0);
     for (size_t i = 0; i < s->fluid; i++)
         for (size_t c = 0; c < s->d; c++)
@@ -151,7 +157,8 @@ static void relax_velocities(scene *s, double step, double *velocity)
 }
 
 void relaxation_oracle(const ascc_plan *plan, size_t fluid, size_t walls, const double *wall,
-                       const double *before, double *position, double *velocity)
+                       const double *before, const double *guess, double *position,
+                       double *velocity)
 {
     const ascc_relaxation *r = &plan->relaxation;
     const double step = plan->time_step / r->support;
@@ -179,6 +186,8 @@ void relaxation_oracle(const ascc_plan *plan, size_t fluid, size_t walls, const 
     find_geometry(s);
     for (size_t i = 0; i < fluid; i++)
         excess[i] = s->density[i] - 1.0;
+    for (size_t i = 0; guess && i < fluid; i++)
+        s->p[i] = guess[i] / r->lattice_response;
     sweep(s, &r->pressure, excess, r->repulsion / r->support);
     for (size_t i = 0; i < fluid; i++)
         for (size_t c = 0; c < s->d; c++) {
