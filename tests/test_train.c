@@ -475,6 +475,40 @@ static void same_seed_gives_the_same_weights_for_any_threads(void **state)
     }
 }
 
+static void a_sequence_may_have_fewer_steps_before_those_with_gradient(void **state)
+{
+    (void)state;
+    static const ascc_training_stage many = {
+        .end = 1000, .unroll = 1, .warm_up = 4, .learning_rate = 1e-3};
+    static const ascc_training_stage few = {
+        .end = 1000, .unroll = 1, .warm_up = 2, .learning_rate = 1e-3};
+    const model_random random = small(27, 2);
+    motion *m = make_motion(9, 2);
+    ascc_trainer_options o = augmented();
+    o.stage_count = 1;
+    o.truth_share = 0.25;
+    o.stage = &few;
+    ascc_trainer *a = open_trainer(&o, &random, m);
+    o.stage = &many;
+    ascc_trainer *other = open_trainer(&o, &random, m);
+    m->sequence.warm_up = 2;
+    ascc_trainer *b = open_trainer(&o, &random, m);
+    iterate(a, 3);
+    iterate(b, 3);
+    iterate(other, 3);
+    assert_same_models(a, b);
+    float *x = parameters_of(a), *y = parameters_of(other);
+    assert_memory_not_equal(x, y, ascc_trainer_parameter_count(a) * sizeof *x);
+    free(x);
+    free(y);
+    m->sequence.warm_up = -1;
+    assert_int_equal(ascc_trainer_add_sequence(b, &m->sequence), ASCC_ERROR_ARGUMENT);
+    ascc_trainer_destroy(&a);
+    ascc_trainer_destroy(&b);
+    ascc_trainer_destroy(&other);
+    free(m);
+}
+
 /* In one of the host's floating point environments; false: it failed, or left another one. */
 #define IN_MODE(mode, call)                                                                        \
     (float_state_set(mode), kept = (call) == ASCC_OK && float_state() == (mode),                   \
@@ -907,6 +941,7 @@ int main(void)
         cmocka_unit_test(gradients_of_penalties_are_right),
         cmocka_unit_test(gradients_through_the_relaxation_are_right),
         cmocka_unit_test(same_seed_gives_the_same_weights_for_any_threads),
+        cmocka_unit_test(a_sequence_may_have_fewer_steps_before_those_with_gradient),
         cmocka_unit_test(the_hosts_floating_point_environment_changes_no_weight),
         cmocka_unit_test(going_on_from_a_saved_state_gives_the_same_bits),
         cmocka_unit_test(a_sequence_with_a_nan_is_refused_by_name),

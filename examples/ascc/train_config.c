@@ -108,8 +108,8 @@ static void derive(const char *path, const char *suffix, const char *end,
 
 /* ---- Sequences ------------------------------------------------------------------------------------ */
 
-static void add_source(reading *g, ascc_train_sources *list, const char *path, double share,
-                       int32_t every)
+static void add_source(reading *g, ascc_train_sources *list, const char *path,
+                       ascc_train_source source)
 {
     char *copy = malloc(strlen(path) + 1);
     ascc_train_source *grown = realloc(list->source, (list->count + 1) * sizeof *list->source);
@@ -121,7 +121,8 @@ static void add_source(reading *g, ascc_train_sources *list, const char *path, d
         return;
     }
     (void)strcpy(copy, path);
-    list->source[list->count++] = (ascc_train_source){copy, share, every};
+    source.path = copy;
+    list->source[list->count++] = source;
 }
 
 /* The folder is meant as it is, only what the file says is a pattern. */
@@ -137,8 +138,8 @@ static bool write_pattern(const reading *g, const char *path, char *into, size_t
 }
 
 /* All files that a path or pattern means, in the order of their names. */
-static void add_matches(reading *g, ascc_train_sources *list, const char *path, double share,
-                        int32_t every)
+static void add_matches(reading *g, ascc_train_sources *list, const char *path,
+                        ascc_train_source source)
 {
     char pattern[2 * ASCC_TRAIN_PATH];
     glob_t found = {0};
@@ -148,7 +149,7 @@ static void add_matches(reading *g, ascc_train_sources *list, const char *path, 
         glob(pattern, 0, NULL, &found) != 0 || found.gl_pathc == 0)
         ascc_members_fail(&g->r, "%.150s: there is no such file", path);
     for (size_t i = 0; i < found.gl_pathc; i++)
-        add_source(g, list, found.gl_pathv[i], share, every);
+        add_source(g, list, found.gl_pathv[i], source);
     globfree(&found);
 }
 
@@ -162,15 +163,17 @@ static void read_sources(reading *g, json_t *data, const char *key, ascc_train_s
         ascc_members_fail(r, "'%s' is empty", key);
     json_array_foreach(array, i, value)
     {
+        ascc_train_source source = {.share = 1.0, .every = 1};
         ascc_members_where(r, "data: %s", key);
         if (json_is_string(value)) {
-            add_matches(g, list, json_string_value(value), 1.0, 1);
+            add_matches(g, list, json_string_value(value), source);
         } else if (json_is_object(value)) {
             const char *path = ascc_members_text(r, value, "path");
-            const double share = number_or(r, value, "share", 1e-6, 1e6, 1.0);
-            const int32_t every = integer_or(r, value, "every", 1, 1000, 1);
+            source.share = number_or(r, value, "share", 1e-6, 1e6, 1.0);
+            source.every = integer_or(r, value, "every", 1, 1000, 1);
+            source.warm_up = integer_or(r, value, "warm_up", 0, 10000, 0);
             ascc_members_end(r, value);
-            add_matches(g, list, path, share, every);
+            add_matches(g, list, path, source);
         } else {
             ascc_members_fail(r, "a path or an object with a path is wanted");
         }

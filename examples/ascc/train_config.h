@@ -12,6 +12,7 @@ typedef struct ascc_train_source {
     char *path;
     double share;
     int32_t every;
+    int32_t warm_up; /* at most; 0 = the stage's */
 } ascc_train_source;
 
 typedef struct ascc_train_sources {

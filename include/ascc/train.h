@@ -68,6 +68,8 @@ typedef struct ascc_training_sequence {
     double time_step;               /* s between frames: the model's, within 1e-4 of it */
     double gravity[3];              /* m/s^2 */
     double share;                   /* how often it is drawn, relative to the others; 0 = 1 */
+    int32_t warm_up; /* at most so many steps before those with gradient; 0 = the stage's W */
+    int32_t reserved;
 } ascc_training_sequence;
 
 /** A stretch of the schedule: until iteration `end`. */

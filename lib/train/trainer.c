@@ -33,7 +33,7 @@ static void give(ascc_trainer *t, void *memory, size_t count, size_t element)
 /* The first released layouts. */
 #define FIRST_OPTIONS_SIZE (offsetof(ascc_trainer_options, whiten) + sizeof(int32_t))
 #define FIRST_STAGE_SIZE sizeof(ascc_training_stage)
-#define FIRST_SEQUENCE_SIZE sizeof(ascc_training_sequence)
+#define FIRST_SEQUENCE_SIZE offsetof(ascc_training_sequence, warm_up)
 #define FIRST_REPORT_SIZE sizeof(ascc_training_report)
 _Static_assert(sizeof(void *) != 8 || FIRST_OPTIONS_SIZE == 144, "layout is part of the ABI");
 _Static_assert(FIRST_STAGE_SIZE == 32, "layout is part of the ABI");
@@ -489,12 +489,15 @@ static size_t starts_of(const ascc_kept_sequence *s, const ascc_training_stage *
     return s->frame_count > steps + 1 ? s->frame_count - 1 - steps : 0;
 }
 
+static int32_t warm_up_of(const ascc_kept_sequence *s, const ascc_training_stage *stage)
+{
+    return s->warm_up > 0 && s->warm_up < stage->warm_up ? s->warm_up : stage->warm_up;
+}
+
 static ascc_status draw_task(ascc_trainer *t, const ascc_training_stage *stage, ascc_random random,
                              ascc_rollout_task *task)
 {
     const double share = t->options.truth_share, drawn = ascc_random_uniform(&random);
-    const double warm_up =
-        drawn < share ? 0.0 : (drawn - share) / (1.0 - share) * (stage->warm_up + 1.0);
     double sum = 0.0, edge = t->model->plan.spacing;
     for (size_t i = 0; i < t->sequence_count; i++)
         sum += starts_of(&t->sequence[i], stage, 0) ? t->sequence[i].share : 0.0;
@@ -513,7 +516,9 @@ static ascc_status draw_task(ascc_trainer *t, const ascc_training_stage *stage, 
     }
     *task = make_task(t, chosen);
     task->unroll = stage->unroll;
-    task->warm_up = (int32_t)warm_up;
+    if (drawn >= share)
+        task->warm_up =
+            (int32_t)((drawn - share) / (1.0 - share) * (warm_up_of(task->sequence, stage) + 1.0));
     while (!starts_of(task->sequence, stage, task->warm_up))
         task->warm_up--;
     task->frame = 1 + (size_t)(ascc_random_uniform(&random) *
