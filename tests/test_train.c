@@ -254,6 +254,7 @@ static double check_gradient(const gradient_case *c)
     options.neighbor_weight = c->loss.neighbor_weight;
     options.density_weight = c->loss.density_weight;
     options.wall_weight = c->loss.wall_weight;
+    options.velocity_weight = c->loss.velocity_weight;
     ascc_trainer *trainer = open_trainer(&options, &c->random, b.m);
     const size_t count = ascc_trainer_parameter_count(trainer);
     float *gradient = calloc(count + 1, sizeof *gradient), *values = parameters_of(trainer);
@@ -371,7 +372,7 @@ static void gradients_of_penalties_are_right(void **state)
                            .loss = {v % 3 == 0   ? 0.5
                                     : v % 3 == 1 ? -1.0
                                                  : 0.0,
-                                    v % 2 ? 3.0 : 0.0, v % 3 ? 2.0 : 0.0},
+                                    v % 2 ? 3.0 : 0.0, v % 3 ? 2.0 : 0.0, v / 2 % 2 ? 1.5 : 0.0},
                            .unroll = 2};
         c.random.scale *= 2.0;
         worst = fmax(worst, check_gradient(&c));
@@ -403,6 +404,7 @@ static void gradients_through_the_relaxation_are_right(void **state)
                            .random = everything(1800 + (uint64_t)v, d),
                            .unroll = 1 + v % 3,
                            .constant_positions = v / 3 % 2,
+                           .loss = {.velocity_weight = v % 4 ? 0.7 : 0.0},
                            .samples = 24};
         c.random.relaxation = text;
         c.random.guess = v > 4;

@@ -367,6 +367,7 @@ static void read_options(reading *g, json_t *root, ascc_trainer_options *o)
     o->neighbor_weight = weight > 0.0 ? weight : -1.0;
     o->density_weight = number_or(r, root, "density_weight", 0.0, MANY, 0.0);
     o->wall_weight = number_or(r, root, "wall_weight", 0.0, MANY, 0.0);
+    o->velocity_weight = number_or(r, root, "velocity_weight", 0.0, MANY, 0.0);
     o->truth_share = number_or(r, root, "truth_share", 0.0, 1.0, 0.0);
     o->whiten = flag_or(r, root, "whiten", true) ? 0 : -1;
     o->relaxation_gradients = flag_or(r, root, "relaxation_gradients", true) ? 0 : -1;

@@ -108,8 +108,8 @@ typedef struct ascc_trainer_options {
     int32_t whiten; /* the inputs of first layers, for Adam (docs/training.md), as the sequences are
                          at the first iteration: 0 = yes, -1 = no */
     int32_t
-        relaxation_gradients; /* through a model's relaxation: 0 = exact, -1 = passed on as if there were
-                                     none */
+        relaxation_gradients; /* through the relaxation: 0 = exact, -1 = as if there were none */
+    double velocity_weight; /* of velocities that are not the truth's, docs/training.md; 0 = none */
 } ascc_trainer_options;
 
 /** What an iteration did. */

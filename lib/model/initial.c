@@ -7,6 +7,7 @@ static const double PI = 3.14159265358979323846;
 static const double FILL = 0.7;  /* of the neighbours inside a lattice: fluids have surfaces */
 static const double WALLS = 2.5; /* points of a wall in a square spacing: dense, or in layers */
 static const double BIAS = 0.1;
+static const double GUESS = 0.1; /* of a relaxation's pressures: weak, and most above 0 */
 
 void ascc_initial_fill(ascc_initial *initial, size_t first, size_t count, double deviation)
 {
@@ -17,15 +18,22 @@ void ascc_initial_fill(ascc_initial *initial, size_t first, size_t count, double
     }
 }
 
+static bool is_guess(const ascc_initial *initial)
+{
+    const int32_t guess = initial->plan->relaxation.guess;
+    return guess && initial->layer == &initial->plan->layer[guess - 2];
+}
+
 void ascc_initial_default(ascc_initial *initial)
 {
-    const bool rectify = initial->term->rectify != 0;
+    const bool rectify = initial->term->rectify != 0, guess = is_guess(initial);
     const double outputs = (double)initial->shape[initial->rank - 1];
     if (initial->rank > 1)
         ascc_initial_fill(initial, 0, initial->count,
-                          sqrt((rectify ? 2.0 : 1.0) * outputs / (double)initial->count));
+                          (guess ? GUESS : 1.0) *
+                              sqrt((rectify ? 2.0 : 1.0) * outputs / (double)initial->count));
     for (size_t i = 0; initial->rank == 1 && i < initial->count; i++)
-        initial->value[i] = rectify ? 0.0f : (float)(initial->gain * BIAS);
+        initial->value[i] = guess ? (float)GUESS : rectify ? 0.0f : (float)(initial->gain * BIAS);
 }
 
 int32_t ascc_initial_source(const ascc_initial *initial)

@@ -105,6 +105,27 @@ static ascc_status wall_loss(const ascc_rollout_task *task, const ascc_plan *pla
     return status;
 }
 
+double ascc_velocity_loss_of(const ascc_rollout_task *task, const ascc_plan *plan,
+                             const double *way, const double *from, const double *to, double share,
+                             double *gradient)
+{
+    const size_t d = (size_t)plan->dimension, n = task->sequence->fluid_count;
+    const double factor = task->velocity_weight / ((double)n * plan->spacing);
+    double sum = 0.0;
+    for (size_t i = 0; i < n * d; i += d) {
+        double e[3], square = 0.0;
+        for (size_t c = 0; c < d; c++) {
+            e[c] = way[i + c] - (to[i + c] - from[i + c]);
+            square += e[c] * e[c];
+        }
+        const double length = sqrt(square);
+        sum += factor * length;
+        for (size_t c = 0; gradient && length > 0.0 && c < d; c++)
+            gradient[i + c] += share * factor * e[c] / length;
+    }
+    return share * sum;
+}
+
 ascc_status ascc_loss_of(const ascc_rollout_task *task, const ascc_plan *plan,
                          const ascc_search_tools *tools, const double *position,
                          const double *truth, const double *wall, const double *normal,

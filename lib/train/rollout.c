@@ -203,14 +203,36 @@ static size_t count_kept(const rollout *r, size_t unroll)
     return fit < 1 ? 1 : fit < unroll ? fit : unroll;
 }
 
-static ascc_status loss_at(rollout *r, size_t t, size_t unroll, double *loss, double *gradient)
+/* Velocities after step t against the truth's way there; gradient as of velocities. */
+static double velocity_loss_at(rollout *r, size_t t, size_t unroll, double *gradient)
+{
+    const double dt = r->motion.time_step, quantum = r->particles->quantum; /* masses are 1 */
+    double *way = r->velocity, *from = r->place, *by_way = r->seen; /* free between two steps */
+    if (!(r->task->velocity_weight > 0.0))
+        return 0.0;
+    truth_at(r, r->first_frame + t - 1, from);
+    for (size_t k = 0; k < r->numbers; k++) {
+        way[k] = (double)r->momentum[t * r->numbers + k] * quantum * dt;
+        by_way[k] = 0.0;
+    }
+    const double loss = ascc_velocity_loss_of(r->task, r->plan, way, from, r->truth,
+                                              1.0 / (double)unroll, gradient ? by_way : NULL);
+    for (size_t k = 0; gradient && k < r->numbers; k++)
+        gradient[k] += by_way[k] * dt;
+    return loss;
+}
+
+/* by_position, by_velocity: NULL, or what their gradients are added to. */
+static ascc_status loss_at(rollout *r, size_t t, size_t unroll, double *loss, double *by_position,
+                           double *by_velocity)
 {
     ascc_message message;
     const ascc_search_tools tools = {&r->worker->loss_scratch, r->worker->context->workers,
                                      &r->worker->context->kernels, &message};
     truth_at(r, r->first_frame + t, r->truth);
+    *loss += velocity_loss_at(r, t, unroll, by_velocity);
     return ascc_loss_of(r->task, r->plan, &tools, r->state + t * r->numbers, r->truth, r->wall,
-                        r->normal, r->first_frame + t, 1.0 / (double)unroll, loss, gradient);
+                        r->normal, r->first_frame + t, 1.0 / (double)unroll, loss, by_position);
 }
 
 /* Gradients after a step become those before it. */
@@ -286,7 +308,7 @@ static void go_back(rollout *r, ascc_rollout_result *result, size_t kept_from, f
     memset(r->by_velocity, 0, n * sizeof *r->by_velocity);
     for (size_t t = unroll; t > 0 && result->status == ASCC_OK; t--) {
         size_t arena = t - 1;
-        result->status = loss_at(r, t, unroll, &unused, r->by_position);
+        result->status = loss_at(r, t, unroll, &unused, r->by_position, r->by_velocity);
         if (result->status == ASCC_OK && t - 1 < kept_from && t - 1 > 0) {
             arena = unroll - 1; /* the last step's: no longer needed */
             restore_state(r, t - 1);
@@ -348,7 +370,7 @@ ascc_rollout_result ascc_rollout_run(ascc_rollout_worker *worker, const ascc_tra
         const size_t done = go_forwards(&r, &result, &kept_from);
         result.failed_frame = r.first_frame + done;
         for (size_t t = 1; t <= done && done == unroll && result.status == ASCC_OK; t++)
-            result.status = loss_at(&r, t, unroll, &result.loss, NULL);
+            result.status = loss_at(&r, t, unroll, &result.loss, NULL, NULL);
         result.skipped = done < unroll;
         if (!result.skipped && result.status == ASCC_OK && task->backward && isfinite(result.loss))
             go_back(&r, &result, kept_from, packed, gradient);

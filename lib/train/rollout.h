@@ -15,7 +15,7 @@ typedef struct ascc_rollout_task {
     ascc_rigid_transform transform;
     double jitter;      /* m and, over a time step, m/s */
     ascc_random random; /* of the jitter */
-    double neighbor_weight, density_weight, wall_weight;
+    double neighbor_weight, density_weight, wall_weight, velocity_weight;
     bool position_gradients, relaxation_gradients;
     bool backward;       /* false: the loss alone */
     size_t memory_limit; /* of kept steps, bytes */
@@ -57,6 +57,12 @@ ascc_rollout_result ascc_rollout_run(ascc_rollout_worker *worker, const ascc_tra
  * until the worker is used again. errors: as of a step. */
 ascc_status ascc_rollout_look(ascc_rollout_worker *worker, const ascc_rollout_task *task,
                               ascc_engine engine);
+
+/* Mean distance of velocities times the time step, way [fluid][dimension], from the way between two true
+ * states, in spacings; gradient (NULL = not wanted), by way, times `share`. */
+double ascc_velocity_loss_of(const ascc_rollout_task *task, const ascc_plan *plan,
+                             const double *way, const double *from, const double *to, double share,
+                             double *gradient);
 
 /* Loss of one state against the truth and its gradient (NULL = not wanted), [fluid][dimension], times
  * `share`. errors: MEMORY, RANGE. */

@@ -78,9 +78,9 @@ static ascc_status read_options(ascc_trainer *t, const ascc_trainer_options *giv
     ascc_trainer_options *o = &t->options;
     if (!ascc_read_struct(o, sizeof *o, given, FIRST_OPTIONS_SIZE))
         return REFUSE(ASCC_ERROR_ARGUMENT, "ascc_trainer_options.size is not understood");
-    const double numbers[] = {o->beta1,          o->beta2,       o->epsilon,
-                              o->clip,           o->average,     o->jitter,
-                              o->density_weight, o->wall_weight, o->truth_share};
+    const double numbers[] = {o->beta1,       o->beta2,          o->epsilon,        o->clip,
+                              o->average,     o->jitter,         o->density_weight, o->wall_weight,
+                              o->truth_share, o->velocity_weight};
     for (size_t i = 0; i < sizeof numbers / sizeof *numbers; i++)
         if (!(numbers[i] >= 0.0 && isfinite(numbers[i])))
             return REFUSE(ASCC_ERROR_ARGUMENT, "options: a number is negative or not finite");
@@ -388,6 +388,7 @@ static ascc_rollout_task make_task(const ascc_trainer *t, size_t sequence)
         .neighbor_weight = t->options.neighbor_weight,
         .density_weight = t->options.density_weight,
         .wall_weight = t->options.wall_weight,
+        .velocity_weight = t->options.velocity_weight,
         .position_gradients = t->options.position_gradients != 0,
         .relaxation_gradients = t->options.relaxation_gradients >= 0,
         .backward = true,

@@ -1098,9 +1098,10 @@ static double frame_loss(const oracle *o, const double *x, const double *y,
 double oracle_loss(oracle *o, const oracle_sequence *sequence, const oracle_references *references,
                    const oracle_loss_options *options, size_t frame, int warm_up, int unroll)
 {
-    const size_t numbers = o->fluid_count * (size_t)o->model->plan.dimension;
+    const size_t d = (size_t)o->model->plan.dimension, numbers = o->fluid_count * d;
     double *x = take(numbers, sizeof *x), *v = take(numbers, sizeof *v);
     double *y = take(numbers, sizeof *y), loss = 0.0;
+    double *before = take(numbers, sizeof *before), *way = take(numbers, sizeof *way);
     true_frame(o, sequence, frame - 1, y);
     true_frame(o, sequence, frame, x);
     for (size_t k = 0; k < numbers; k++)
@@ -1113,8 +1114,16 @@ double oracle_loss(oracle *o, const oracle_sequence *sequence, const oracle_refe
         true_frame(o, sequence, frame + (size_t)t, y);
         if (t > warm_up)
             loss += frame_loss(o, x, y, options, references) / unroll;
+        true_frame(o, sequence, frame + (size_t)t - 1, before);
+        for (size_t k = 0; k < numbers; k++)
+            way[k] = v[k] * o->model->plan.time_step + before[k];
+        for (size_t i = 0; t > warm_up && i < o->fluid_count; i++)
+            loss += options->velocity_weight * distance(way + i * d, y + i * d, d) /
+                    (o->model->plan.spacing * (double)o->fluid_count * unroll);
     }
     o->weight = moved;
+    free(way);
+    free(before);
     free(y);
     free(v);
     free(x);

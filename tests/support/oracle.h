@@ -64,7 +64,7 @@ typedef struct oracle_sequence {
 } oracle_sequence;
 
 typedef struct oracle_loss_options {
-    double neighbor_weight, density_weight, wall_weight;
+    double neighbor_weight, density_weight, wall_weight, velocity_weight;
 } oracle_loss_options;
 
 /* What the loss compares with, over all particles and frames. */
