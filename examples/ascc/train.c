@@ -301,15 +301,25 @@ static void show(training *t, const ascc_training_report *report)
     ascc_progress_add(&t->progress, 1);
 }
 
+static double cpu_seconds(void)
+{
+    struct timespec t;
+    return clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &t) == 0
+               ? (double)t.tv_sec + 1e-9 * (double)t.tv_nsec
+               : 0.0;
+}
+
 static bool iterate(training *t)
 {
     ascc_training_report report = {.size = sizeof report};
     ascc_validation v = {.measured = false};
+    const double begin = cpu_seconds();
     if (ascc_trainer_iterate(t->trainer, &report) != ASCC_OK) {
         (void)snprintf(t->error, sizeof t->error, "iteration %" PRIu64 ": %.400s",
                        ascc_trainer_iteration(t->trainer) + 1, ascc_trainer_message(t->trainer));
         return false;
     }
+    const double seconds = cpu_seconds() - begin;
     const bool learned = report.skipped < t->config.options.batch;
     if (!learned) /* there is no loss, and weights that compute nothing are not to be kept */
         report.loss = NAN;
@@ -317,7 +327,7 @@ static bool iterate(training *t)
         report.iteration % t->config.validate_every == 0 || report.iteration == schedule_end(t);
     if (t->truth_count && due && !validate(t, &v))
         return false;
-    if (!ascc_train_log_add(&t->log, stage_of(t, report.iteration), &report, &v))
+    if (!ascc_train_log_add(&t->log, stage_of(t, report.iteration), &report, seconds, &v))
         return fail(t, t->config.log, strerror(errno));
     show(t, &report);
     return !learned || now() - t->saved < t->config.checkpoint_seconds || save(t);
@@ -538,7 +548,7 @@ static void print_result(const training *t)
     const ascc_train_config *c = &t->config;
     const ascc_validation *best = &t->log.best;
     const uint64_t done = ascc_trainer_iteration(t->trainer);
-    ascc_line(stdout, "%s: %" PRIu64 " iterations, %.0f s", c->output, done, t->log.seconds);
+    ascc_line(stdout, "%s: %" PRIu64 " iterations, %.0f CPU s", c->output, done, t->log.seconds);
     if (best->measured)
         ascc_line(stdout, "  best on valid      errors %.4g and %.4g mm, %s", 1e3 * best->error[0],
                   1e3 * best->error[1], best->stable ? "rollouts hold" : "rollouts lose particles");

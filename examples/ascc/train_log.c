@@ -9,11 +9,13 @@
 #include <string.h>
 #include <unistd.h>
 
-#define COLUMNS                                                                                    \
-    "learning_rate,loss,gradient_norm,seconds,steps,ended_early,"                                  \
+#define COLUMNS(seconds)                                                                           \
+    "learning_rate,loss,gradient_norm," seconds ",steps,ended_early,"                              \
     "skipped,err_n1,err_n2,rollout_last,escaped,density_error,stable\n"
-static const char HEADER[] = "iteration,stage,unroll,warm_up," COLUMNS;
-static const char OLD_HEADER[] = "iteration,stage,horizon,presteps," COLUMNS; /* the same columns */
+static const char HEADER[] = "iteration,stage,unroll,warm_up," COLUMNS("cpu_seconds");
+/* The same columns, seconds by the clock on the wall. */
+static const char *const OLD_HEADERS[] = {"iteration,stage,unroll,warm_up," COLUMNS("seconds"),
+                                          "iteration,stage,horizon,presteps," COLUMNS("seconds")};
 enum { FIELDS = 17, SECONDS = 7, ERRORS = 11 };
 
 bool ascc_validation_better(const ascc_validation *a, const ascc_validation *b)
@@ -68,7 +70,8 @@ static long read_rows(FILE *file, uint64_t iteration, ascc_train_log *log)
     double field[FIELDS];
     if (!fgets(line, sizeof line, file))
         return 0;
-    if (strcmp(line, HEADER) != 0 && strcmp(line, OLD_HEADER) != 0)
+    if (strcmp(line, HEADER) != 0 && strcmp(line, OLD_HEADERS[0]) != 0 &&
+        strcmp(line, OLD_HEADERS[1]) != 0)
         return -1;
     if (iteration == 0)
         return 0;
@@ -114,10 +117,10 @@ static void add_number(FILE *file, double value)
 }
 
 bool ascc_train_log_add(ascc_train_log *log, int32_t stage, const ascc_training_report *r,
-                        const ascc_validation *v)
+                        double seconds, const ascc_validation *v)
 {
     FILE *f = log->file;
-    log->seconds += r->seconds;
+    log->seconds += seconds;
     fprintf(f, "%" PRIu64 ",%d,%d,%d,%.9g", r->iteration, stage, r->unroll, r->warm_up,
             r->learning_rate);
     add_number(f, r->loss);

@@ -22,7 +22,7 @@ bool ascc_validation_better(const ascc_validation *a, const ascc_validation *b);
 
 typedef struct ascc_train_log {
     FILE *file;
-    double seconds;             /* of training in all */
+    double seconds;             /* of training in all, CPU time of all threads */
     ascc_validation last, best; /* among the rows written */
 } ascc_train_log;
 
@@ -30,9 +30,9 @@ typedef struct ascc_train_log {
  * the struct holds. False with a line in error. */
 bool ascc_train_log_open(const char *path, uint64_t iteration, ascc_train_log *log, char *error,
                          size_t capacity);
-/* One row. False when it cannot be written (errno tells). */
+/* One row; seconds: that the iteration took. False when it cannot be written (errno tells). */
 bool ascc_train_log_add(ascc_train_log *log, int32_t stage, const ascc_training_report *report,
-                        const ascc_validation *validation);
+                        double seconds, const ascc_validation *validation);
 void ascc_train_log_close(ascc_train_log *log);
 
 /* Draws the log's loss and errors with gnuplot; false when that is not installed or fails. */

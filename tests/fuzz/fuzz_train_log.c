@@ -38,9 +38,9 @@ static void resume(const char *path, uint64_t iteration)
     fuzz_require(same(again.seconds, seconds));
     fuzz_require(same_validation(&again.last, &last) && same_validation(&again.best, &best));
     const ascc_training_report report = {
-        .size = sizeof report, .iteration = iteration + 1, .loss = 0.5, .seconds = 1.0};
+        .size = sizeof report, .iteration = iteration + 1, .loss = 0.5};
     const ascc_validation worse = {.measured = true, .error = {1.0, 2.0}};
-    fuzz_require(ascc_train_log_add(&again, 1, &report, &worse));
+    fuzz_require(ascc_train_log_add(&again, 1, &report, 1.0, &worse));
     ascc_train_log_close(&again);
 
     fuzz_require(ascc_train_log_open(path, iteration + 1, &log, error, sizeof error));
