@@ -436,7 +436,8 @@ static void open_random(world *w, int d, int32_t threads, uint32_t cpu_disable, 
     open_context(w, &options);
     (void)snprintf(
         more, sizeof more,
-        ",\"divergence\":[0.5,0.5,0.5],\"repulsion\":{\"distance\":%s,\"stiffness\":0.5}",
+        ",\"divergence\":[0.5,0.5,0.5],\"repulsion\":{\"distance\":%s,\"stiffness\":0.5},"
+        "\"guess\":\"guess\"",
         model_number(0.25 * spacing));
     const model_random network = {.seed = 3,
                                   .dimension = d,
@@ -446,6 +447,8 @@ static void open_random(world *w, int d, int32_t threads, uint32_t cpu_disable, 
                                   .walls = 1,
                                   .contact = 0.3,
                                   .scale = 0.001,
+                                  .area = 1,
+                                  .guess = 1,
                                   .relaxation = relaxation_text(d, 0, more)};
     unsigned char *bytes = model_builder_random(&network, &size);
     check_good(w, ascc_model_load_memory(w->context, bytes, size, &w->model));
@@ -883,6 +886,12 @@ static void bad_constants_are_refused_by_name(void **state)
          "\"limit\":0.01,"
          "\"warm\":0.9}",
          "warm"},
+        {"{\"support\":0.1,\"rest_volume\":1e-4,\"omega\":[0.5,0.5,0.5,0.5],\"epsilon\":0.1,"
+         "\"limit\":0.01,\"guess\":\"nobody\"}",
+         "'nobody'"},
+        {"{\"support\":0.1,\"rest_volume\":1e-4,\"omega\":[0.5,0.5,0.5,0.5],\"epsilon\":0.1,"
+         "\"limit\":0.01,\"guess\":\"fluid\"}",
+         "one channel"},
     };
     ascc_context *context = NULL;
     assert_int_equal(ascc_context_create(NULL, &context), ASCC_OK);
