@@ -139,7 +139,8 @@ static bool add_sequence(training *t, const ascc_train_source *source)
                                              .time_step = s.time_step * source->every,
                                              .gravity = {s.gravity[0], s.gravity[1], s.gravity[2]},
                                              .share = source->share,
-                                             .warm_up = source->warm_up};
+                                             .warm_up = source->warm_up,
+                                             .jitter = source->jitter};
     const ascc_status status = ascc_trainer_add_sequence(t->trainer, &sequence);
     ascc_sequence_free(&s);
     return status == ASCC_OK || fail(t, source->path, ascc_trainer_message(t->trainer));

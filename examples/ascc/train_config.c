@@ -172,6 +172,7 @@ static void read_sources(reading *g, json_t *data, const char *key, ascc_train_s
             source.share = number_or(r, value, "share", 1e-6, 1e6, 1.0);
             source.every = integer_or(r, value, "every", 1, 1000, 1);
             source.warm_up = integer_or(r, value, "warm_up", 0, 10000, 0);
+            source.jitter = number_or(r, value, "jitter", 0.0, 1.0, 0.0);
             ascc_members_end(r, value);
             add_matches(g, list, path, source);
         } else {

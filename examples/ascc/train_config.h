@@ -13,6 +13,7 @@ typedef struct ascc_train_source {
     double share;
     int32_t every;
     int32_t warm_up; /* at most; 0 = the stage's */
+    double jitter;   /* up to; 0 = the config's */
 } ascc_train_source;
 
 typedef struct ascc_train_sources {

@@ -70,6 +70,7 @@ typedef struct ascc_training_sequence {
     double share;                   /* how often it is drawn, relative to the others; 0 = 1 */
     int32_t warm_up; /* at most so many steps before those with gradient; 0 = the stage's W */
     int32_t reserved;
+    double jitter; /* in place of the options', up to so much, drawn; 0 = the options' */
 } ascc_training_sequence;
 
 /** A stretch of the schedule: until iteration `end`. */

@@ -44,10 +44,12 @@ static ascc_status check(const ascc_plan *plan, const ascc_training_sequence *g,
             return ascc_fail(message, ASCC_ERROR_NOT_FINITE,
                              "sequence %s: boundary row %zu is not finite", name, i / d);
     for (int c = 0; c < 3; c++)
-        if (!isfinite(g->gravity[c]) || !(g->share >= 0.0) || !isfinite(g->share) || g->warm_up < 0)
+        if (!isfinite(g->gravity[c]) || !(g->share >= 0.0) || !isfinite(g->share) ||
+            g->warm_up < 0 || !(g->jitter >= 0.0) || !isfinite(g->jitter))
             return ascc_fail(
                 message, ASCC_ERROR_ARGUMENT,
-                "sequence %s: gravity, share or warm_up is not a number that makes sense", name);
+                "sequence %s: gravity, share, warm_up or jitter is not a number that makes sense",
+                name);
     return ASCC_OK;
 }
 
@@ -183,6 +185,7 @@ ascc_status ascc_kept_sequence_create(ascc_kept_sequence *s, const ascc_allocato
     s->dimension = plan->dimension;
     s->share = given->share > 0.0 ? given->share : 1.0;
     s->warm_up = given->warm_up;
+    s->jitter = given->jitter;
     memcpy(s->gravity, given->gravity, sizeof s->gravity);
     s->position = copy(allocator, given->position, s->frame_count * s->fluid_count * d);
     s->wall = copy(allocator, given->boundary_position, s->boundary_count * d);

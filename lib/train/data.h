@@ -16,6 +16,7 @@ typedef struct ascc_kept_sequence {
     float *position, *wall, *normal; /* [frame][fluid][d], [boundary][d] */
     double gravity[3], share;
     int32_t warm_up;   /* at most; 0 = the stage's */
+    double jitter;     /* up to, spacings; 0 = the trainer's */
     uint16_t *near;    /* [frame][fluid]: other fluid particles within the support radius */
     double dense;      /* rho_95 of docs/training.md */
     double wall_depth; /* s_05, m */

@@ -529,6 +529,9 @@ static ascc_status draw_task(ascc_trainer *t, const ascc_training_stage *stage, 
     task->transform = ascc_rigid_transform_draw(&random, task->sequence, t->options.rotate != 0,
                                                 t->options.mirror != 0, edge);
     task->jitter = t->options.jitter * t->model->plan.spacing;
+    if (task->sequence->jitter > 0.0)
+        task->jitter =
+            task->sequence->jitter * ascc_random_uniform(&random) * t->model->plan.spacing;
     task->random = random;
     return ASCC_OK;
 }
