@@ -498,45 +498,116 @@ static void moments_equal_doubles_and_have_the_same_bits_on_every_cpu(void **sta
     }
 }
 
-static void pair_strengths_equal_doubles_and_have_the_same_bits_on_every_cpu(void **state)
+/* ---- pairs along lines ---- */
+
+#define LINE_ROWS 50
+#define LINE_RADIUS 50000000
+
+typedef struct lines_case {
+    int32_t at[3][LINE_ROWS];
+    float coefficient[(LINE_ROWS + 1) * 16], motion[(LINE_ROWS + 1) * 8];
+    double place[LINE_ROWS * 3], mass[ASCC_PAIR_BATCH];
+    uint32_t neighbor[ASCC_PAIR_BATCH];
+    ascc_lines lines;
+} lines_case;
+
+/* options: 1 = neighbours are rows, 2 = damped, 4 = turned, 8 = in the plane, 16 = a limit that cuts off. */
+static void random_lines(lines_case *c, size_t bumps, unsigned options)
+{
+    const size_t d = options & 8 ? 2 : 3;
+    for (size_t i = 0; i < LINE_ROWS * 3; i++) {
+        c->at[i % 3][i / 3] = i % 3 < d ? (int32_t)(uniform() * LINE_RADIUS / 4) : 0;
+        c->place[i] = c->at[i % 3][i / 3] + 1e6 * (double)uniform() * (i % 3 < d);
+    }
+    for (size_t i = 0; i < sizeof c->coefficient / sizeof *c->coefficient; i++) /* [row][bump][2] */
+        c->coefficient[i] = i % 16 / 2 < bumps && (i % 2 == 0 || options & 2) ? uniform() : 0.0f;
+    for (size_t i = 0; i < sizeof c->motion / sizeof *c->motion; i++)
+        c->motion[i] = uniform();
+    for (size_t k = 0; k < ASCC_PAIR_BATCH; k++) {
+        c->neighbor[k] = 1 + next() % (LINE_ROWS - 1);
+        c->mass[k] = 1.5 + (double)uniform();
+    }
+    for (int i = 0; i < 3; i++) { /* neighbour 1 lies where row 0 does; all others differ */
+        c->at[i][1] = c->at[i][0];
+        c->place[3 + i] = c->place[i];
+    }
+    c->lines = (ascc_lines){.row = {c->at[0], c->at[1], c->at[2]},
+                            .neighbor = {c->at[0], c->at[1], c->at[2]},
+                            .inverse_radius = 1.0f / LINE_RADIUS,
+                            .bumps = bumps,
+                            .dimension = d,
+                            .both = options & 1,
+                            .coefficient = options & 1 ? c->coefficient : NULL,
+                            .motion = options & 2 ? c->motion : NULL,
+                            .a = 8,
+                            .area = options & 1 ? NULL : c->motion + 5,
+                            .area_stride = 8,
+                            .place = (options & 5) == 5 ? c->place : NULL,
+                            .factor = 1e9,
+                            .limit = options & 16 ? 0.2 : INFINITY};
+}
+
+/* The impulse of row 0 from neighbour j, from docs/method.md. */
+static void impulse_of(const lines_case *c, size_t j, double mass, double impulse[3])
+{
+    const ascc_lines *l = &c->lines;
+    double seen[3], line[3], u[3], distance = 0.0, length = 0.0, cosine = 0.0, approach = 0.0;
+    double part[2] = {0.0, 0.0};
+    for (size_t i = 0; i < 3; i++) {
+        seen[i] = (double)c->at[i][j] - (double)c->at[i][0];
+        line[i] = l->place ? c->place[j * 3 + i] - c->place[i] : seen[i];
+        distance += seen[i] * seen[i];
+        length += line[i] * line[i];
+        cosine += seen[i] * line[i];
+    }
+    distance = sqrt(distance);
+    length = sqrt(length);
+    cosine = distance > 0.0 && length > 0.0 ? cosine / distance / length : 0.0;
+    for (size_t i = 0; i < 3; i++) {
+        u[i] = length > 0.0 ? line[i] / length : 0.0;
+        if (l->motion && i < l->dimension)
+            approach +=
+                u[i] * ((double)c->motion[i] - (l->both ? (double)c->motion[j * 8 + i] : 0.0));
+    }
+    for (size_t b = 0; b < l->bumps; b++)
+        for (size_t p = 0; p < 2; p++)
+            part[p] += bump_of(distance / LINE_RADIUS, l->bumps, b) *
+                       ((double)c->coefficient[b * 2 + p] +
+                        (l->both ? (double)c->coefficient[j * 16 + b * 2 + p] : 0.0));
+    const double area = l->area ? (double)c->motion[j * 8 + 5] : 1.0;
+    const double strength = area * ((l->place ? cosine : 1.0) * part[0] - part[1] * approach);
+    const double total = fmax(-l->limit, fmin(l->limit, strength));
+    for (size_t i = 0; i < 3; i++)
+        impulse[i] = total * l->factor * mass * u[i];
+}
+
+static void pair_lines_equal_doubles_and_have_the_same_bits_on_every_cpu(void **state)
 {
     (void)state;
     ascc_kernels table[16];
     const int count = tables(table);
-    for (size_t bumps = 1; bumps <= 8; bumps++)
-        for (size_t k = 0; k < 20; k++) {
-            float *distance = floats(k + 1), *center = floats(8), *feature = floats(50 * 8);
-            uint32_t neighbor[20];
-            for (size_t n = bumps; n < 8; n++) {
-                center[n] = 0.0f;
-                for (size_t i = 0; i < 50; i++)
-                    feature[i * 8 + n] = 0.0f;
+    for (unsigned options = 0; options < 32; options++)
+        for (size_t bumps = 1; bumps <= 8; bumps++)
+            for (size_t k = 0; k <= ASCC_PAIR_BATCH; k = k < 10 ? k + 1 : k + 9) {
+                static lines_case c;
+                double want[3][ASCC_PAIR_BATCH], got[3][ASCC_PAIR_BATCH];
+                const size_t step = k % 2;
+                random_lines(&c, bumps, options);
+                table[0].pair_lines(&c.lines, 0, c.coefficient, c.neighbor, k, c.mass, step, want);
+                for (size_t j = 0; j < k; j++) {
+                    double right[3];
+                    impulse_of(&c, c.neighbor[j], c.mass[step ? j : 0], right);
+                    for (size_t i = 0; i < 3; i++)
+                        assert_true(fabs(right[i] - want[i][j]) < 2e4);
+                }
+                for (int t = 1; t < count; t++) {
+                    table[t].pair_lines(&c.lines, 0, c.coefficient, c.neighbor, k, c.mass, step,
+                                        got);
+                    for (size_t i = 0; i < 3; i++)
+                        for (size_t j = 0; j < k; j++)
+                            assert_true(memcmp(&want[i][j], &got[i][j], sizeof(double)) == 0);
+                }
             }
-            float *want = guarded(k);
-            for (size_t i = 0; i < k; i++) {
-                distance[i] = fabsf(distance[i]);
-                neighbor[i] = next() % 50;
-            }
-            table[0].pair_strengths(distance, neighbor, k, center, feature, bumps, want);
-            check_guard(want, k);
-            for (size_t i = 0; i < k; i++) {
-                double sum = 0.0;
-                for (size_t n = 0; n < bumps; n++)
-                    sum += bump_of((double)distance[i], bumps, n) *
-                           ((double)center[n] + (double)feature[neighbor[i] * 8 + n]);
-                assert_true(fabs(sum - (double)want[i]) < 2e-6 * (double)bumps);
-            }
-            for (int t = 1; t < count; t++) {
-                float *got = guarded(k);
-                table[t].pair_strengths(distance, neighbor, k, center, feature, bumps, got);
-                check_same_bits(want, got, k + 8, "pair strengths");
-                free(got);
-            }
-            free(distance);
-            free(center);
-            free(feature);
-            free(want);
-        }
 }
 
 /* ---- gather, multiply, pair terms ---- */
@@ -734,10 +805,16 @@ static void random_impulses(impulse_case *c)
     c->factor[0] = c->mass[0] = c->mass[1] = 1.0;
 }
 
-static int impulses(const ascc_kernels *table, impulse_case *c, size_t step, size_t k)
+/* Of both kernels that give impulses; added: what is given is made here, in space. */
+static int impulses(const ascc_kernels *table, impulse_case *c, size_t step, size_t k, bool added)
 {
-    return table->pair_impulses(c->term, c->factor, c->mass, step, 0x1p50, c->neighbor, k, c->own,
-                                c->sum);
+    double x[3][ASCC_PAIR_BATCH];
+    for (size_t j = 0; added && j < k; j++)
+        for (size_t i = 0; i < 3; i++)
+            x[i][j] = (double)c->term[j * 4 + i] * c->factor[i] * c->mass[step ? j : 0];
+    return added ? table->add_impulses(x, 0x1p50, c->neighbor, k, c->own, c->sum)
+                 : table->pair_impulses(c->term, c->factor, c->mass, step, 0x1p50, c->neighbor, k,
+                                        c->own, c->sum);
 }
 
 static void pair_impulses_are_the_nearest_integers_on_every_cpu(void **state)
@@ -756,9 +833,9 @@ static void pair_impulses_are_the_nearest_integers_on_every_cpu(void **state)
                     want.own[i] += (int64_t)rint(x);
                     want.sum[c.neighbor[j] * 4 + i] -= (int64_t)rint(x);
                 }
-            for (int t = 0; t < count; t++) {
+            for (int t = 0; t < 2 * count; t++) {
                 impulse_case got = c;
-                assert_int_equal(impulses(&table[t], &got, step, k), 1);
+                assert_int_equal(impulses(&table[t / 2], &got, step, k, t % 2), 1);
                 assert_true(memcmp(got.own, want.own, sizeof want.own) == 0);
                 assert_true(memcmp(got.sum, want.sum, sizeof want.sum) == 0);
             }
@@ -772,7 +849,7 @@ static void an_impulse_that_does_not_fit_is_told_on_every_cpu(void **state)
     const int count = tables(table);
     for (size_t k = 1; k <= MOST_PAIRS; k++)
         for (int fault = 0; fault < 6; fault++)
-            for (int t = 0; t < count; t++) {
+            for (int t = 0; t < 2 * count; t++) {
                 impulse_case c;
                 random_impulses(&c);
                 const size_t last = k - 1;
@@ -794,7 +871,7 @@ static void an_impulse_that_does_not_fit_is_told_on_every_cpu(void **state)
                     c.own[1] = INT64_MIN + 1000 * (int64_t)k - 1;
                     c.factor[1] = -1e3;
                 }
-                assert_int_equal(impulses(&table[t], &c, 0, k), 0);
+                assert_int_equal(impulses(&table[t / 2], &c, 0, k, t % 2), 0);
             }
 }
 
@@ -948,7 +1025,7 @@ int main(void)
         cmocka_unit_test(the_basis_equals_doubles_and_has_the_same_bits_on_every_cpu),
         cmocka_unit_test(at_the_centre_only_the_first_harmonic_counts),
         cmocka_unit_test(moments_equal_doubles_and_have_the_same_bits_on_every_cpu),
-        cmocka_unit_test(pair_strengths_equal_doubles_and_have_the_same_bits_on_every_cpu),
+        cmocka_unit_test(pair_lines_equal_doubles_and_have_the_same_bits_on_every_cpu),
         cmocka_unit_test(gather_equals_doubles_and_has_the_same_bits_on_every_cpu),
         cmocka_unit_test(multiply_equals_doubles_and_has_the_same_bits_on_every_cpu),
         cmocka_unit_test(pair_terms_equal_doubles_and_have_the_same_bits_on_every_cpu),

@@ -405,17 +405,6 @@ static void gather_basis(const float *factor, size_t stride, size_t bumps, size_
         }
 }
 
-static void pair_strengths(const float *distance, const uint32_t *neighbor, size_t k,
-                           const float *center, const float *feature, size_t bumps, float *out)
-{
-    static const float numbers[LANES] = {0.0f, 1.0f, 2.0f, 3.0f, 4.0f, 5.0f, 6.0f, 7.0f};
-    const vector number = load(numbers), count = fill((float)bumps), own = load(center);
-    for (size_t i = 0; i < k; i++) {
-        const vector both = add(own, load(feature + (size_t)neighbor[i] * LANES));
-        out[i] = total(times(bump_at(fill(distance[i]), count, number), both));
-    }
-}
-
 /* Eight pairs: where they lie among the bumps, and what both bumps that reach them give. */
 typedef struct reached {
     int32_t low[LANES];
@@ -632,69 +621,319 @@ static void pair_terms(const ascc_pairs *pairs, const float *window, const uint3
     }
 }
 
+/* ---- Pairs along lines ---- */
+
+/* Strengths and dampings of eight pairs at these distances over the radius: of all bumps only two that lie next
+ * to each other are not 0. */
+static inline void find_strengths(const ascc_lines *l, float own[2][LANES],
+                                  const uint32_t *neighbor, const float *rho, float *strength,
+                                  float *damping)
+{
+    const vector one = fill(1.0f), zero = fill(0.0f);
+    const vector t = times(fill((float)l->bumps), load(rho));
+    const vector low = whole(smaller(t, fill(l->bumps > 1 ? (float)(l->bumps - 2) : 0.0f)));
+    const vector f = minus(t, low), g = minus(t, add(low, one));
+    const vector u = larger(minus(one, times(f, f)), zero);
+    const vector v = larger(minus(one, times(g, g)), zero);
+    int32_t first[LANES], second[LANES];
+    vector both[4] = {zero, zero, zero, zero};
+    store_whole(first, low);
+    store_whole(second, add(low, one));
+    if (l->both) {
+        const float *from[LANES];
+        for (size_t i = 0; i < LANES; i++)
+            from[i] = l->coefficient + (size_t)neighbor[i] * 16 + (size_t)first[i] * 2;
+        load_quads(from, both);
+    }
+    const vector s = add(times(times(u, u), add(pick_lanes(own[0], first), both[0])),
+                         times(times(v, v), add(pick_lanes(own[0], second), both[2])));
+    const vector d = add(times(times(u, u), add(pick_lanes(own[1], first), both[1])),
+                         times(times(v, v), add(pick_lanes(own[1], second), both[3])));
+    store(strength, s);
+    store(damping, d);
+}
+
+/* Displacements of n pairs as the network sees them, and their distances over the radius. */
+static void find_displacements(const ascc_lines *l, size_t row, const uint32_t *RESTRICT neighbor,
+                               size_t n, double d[3][ASCC_PAIR_BATCH], float *RESTRICT rho)
+{
+    int32_t at[3][ASCC_PAIR_BATCH];
+    const int32_t *RESTRICT x = l->neighbor.x, *RESTRICT y = l->neighbor.y;
+    const int32_t *RESTRICT z = l->neighbor.z;
+    const uint32_t ux = (uint32_t)l->row.x[row], uy = (uint32_t)l->row.y[row];
+    const uint32_t uz = (uint32_t)l->row.z[row];
+    const float inverse = l->inverse_radius;
+    for (size_t i = 0; i < n; i++) {
+        at[0][i] = (int32_t)((uint32_t)x[neighbor[i]] - ux);
+        at[1][i] = (int32_t)((uint32_t)y[neighbor[i]] - uy);
+        at[2][i] = (int32_t)((uint32_t)z[neighbor[i]] - uz);
+    }
+    for (size_t i = 0; i < n; i++) {
+        const float dx = (float)at[0][i] * inverse;
+        const float dy = (float)at[1][i] * inverse;
+        const float dz = (float)at[2][i] * inverse;
+        rho[i] = sqrtf(dx * dx + dy * dy + dz * dz);
+    }
+    for (size_t c = 0; c < 3; c++)
+        for (size_t i = 0; i < n; i++)
+            d[c][i] = (double)at[c][i];
+}
+
+/* Strengths times the cosine between what the network sees, d, and the lines between the places, which d
+ * becomes. */
+static void turn_lines(const ascc_lines *l, size_t row, const uint32_t *neighbor, size_t n,
+                       double d[3][ASCC_PAIR_BATCH], float *strength)
+{
+    const double *own = l->place + row * 3;
+    for (size_t i = 0; i < n; i++) {
+        double along = 0.0, square = 0.0, seen = 0.0;
+        for (size_t c = 0; c < 3; c++) {
+            const double line = l->place[(size_t)neighbor[i] * 3 + c] - own[c];
+            seen += d[c][i] * d[c][i];
+            along += line * d[c][i];
+            square += line * line;
+            d[c][i] = line;
+        }
+        const double lengths = sqrt(seen * square);
+        strength[i] *= lengths > 0.0 ? (float)(along / lengths) : 0.0f;
+    }
+}
+
+/* Speeds of approach of n pairs times the length of their line d. */
+static void find_approach(const ascc_lines *l, size_t row, const uint32_t *neighbor, size_t n,
+                          double d[3][ASCC_PAIR_BATCH], double *RESTRICT approach)
+{
+    float v[3][ASCC_PAIR_BATCH];
+    double own[3] = {0.0, 0.0, 0.0};
+    for (size_t c = 0; c < l->dimension; c++)
+        own[c] = (double)l->motion[row * l->a + c];
+    for (size_t i = 0; i < n; i += LANES) {
+        const float *from[LANES];
+        vector four[4] = {fill(0.0f), fill(0.0f), fill(0.0f), fill(0.0f)};
+        for (size_t j = 0; l->both && j < LANES; j++)
+            from[j] = l->motion + (size_t)neighbor[i + j] * l->a;
+        if (l->both)
+            load_quads(from, four);
+        store(v[0] + i, four[0]);
+        store(v[1] + i, four[1]);
+        store(v[2] + i, l->dimension > 2 ? four[2] : fill(0.0f));
+    }
+    for (size_t i = 0; i < n; i++)
+        approach[i] = (own[0] - (double)v[0][i]) * d[0][i] + (own[1] - (double)v[1][i]) * d[1][i] +
+                      (own[2] - (double)v[2][i]) * d[2][i];
+}
+
+static void pair_lines(const ascc_lines *l, size_t row, const float coefficient[16],
+                       const uint32_t *neighbor, size_t k, const double *mass, size_t mass_step,
+                       double impulse[3][ASCC_PAIR_BATCH])
+{
+    float rho[ASCC_PAIR_BATCH], strength[ASCC_PAIR_BATCH], damping[ASCC_PAIR_BATCH], own[2][LANES];
+    double approach[ASCC_PAIR_BATCH], masses[ASCC_PAIR_BATCH];
+    uint32_t near[ASCC_PAIR_BATCH];
+    const size_t n = (k + LANES - 1) / LANES * LANES;
+    const double limit = l->limit, factor = l->factor;
+    double *RESTRICT x = impulse[0], *RESTRICT y = impulse[1], *RESTRICT z = impulse[2];
+    for (size_t i = 0; i < n; i++) {
+        near[i] = neighbor[i < k ? i : 0];
+        masses[i] = mass[i < k ? i * mass_step : 0];
+    }
+    for (size_t i = 0; i < LANES; i++) {
+        own[0][i] = coefficient[2 * i];
+        own[1][i] = coefficient[2 * i + 1];
+    }
+    find_displacements(l, row, near, n, impulse, rho);
+    for (size_t i = 0; i < n; i += LANES)
+        find_strengths(l, own, near + i, rho + i, strength + i, damping + i);
+    for (size_t i = 0; l->area && i < n; i++) {
+        const float area = l->area[near[i] * l->area_stride];
+        strength[i] *= area;
+        damping[i] *= area;
+    }
+    if (l->place)
+        turn_lines(l, row, near, n, impulse, strength);
+    if (l->motion)
+        find_approach(l, row, near, n, impulse, approach);
+    else
+        memset(approach, 0, n * sizeof *approach);
+    for (size_t i = 0; i < n; i++) {
+        const double length = sqrt(x[i] * x[i] + y[i] * y[i] + z[i] * z[i]);
+        const double inverse = length > 0.0 ? 1.0 / length : 0.0;
+        double s = (double)strength[i] - (double)damping[i] * (approach[i] * inverse);
+        s = s > limit ? limit : s < -limit ? -limit : s;
+        const double share = length > 0.0 ? s * factor * inverse : 0.0;
+        x[i] = x[i] * share * masses[i];
+        y[i] = y[i] * share * masses[i];
+        z[i] = z[i] * share * masses[i];
+    }
+}
+
+/* ---- Impulses to integers ---- */
+
 /* Rounds |x| < 2^51 to the nearest integer, ties to even, in any build: the low bits of x + this. */
 #define ROUND_MAGIC 6755399441055744.0
 
+/* What was given so far: to the row, and whether all of it could be held. Four doubles, and four integers, are
+ * one value. */
 #if defined(ASCC_USE_AVX2)
-/* The loop below on four doubles, same operations in the same order. */
-static int pair_impulses(const float *term, const double factor[4], const double *mass,
-                         size_t mass_step, double limit, const uint32_t *neighbor, size_t k,
-                         int64_t own[4], int64_t *sum)
+typedef __m256d quad;
+
+typedef struct given {
+    __m256i ours, wrong;
+    __m256d good, limit;
+} given;
+
+static inline quad times_quads(quad a, quad b)
 {
-    const __m256d magic = _mm256_set1_pd(ROUND_MAGIC), limits = _mm256_set1_pd(limit);
-    const __m256d sign = _mm256_set1_pd(-0.0), factors = _mm256_loadu_pd(factor);
-    const __m256i zero = _mm256_castpd_si256(magic);
-    __m256i ours = _mm256_loadu_si256((const __m256i *)own), wrong = _mm256_setzero_si256();
-    __m256d good = _mm256_castsi256_pd(_mm256_set1_epi64x(-1));
-    for (size_t j = 0; j < k; j++, mass += mass_step) {
-        __m256i *to = (__m256i *)(sum + (size_t)neighbor[j] * 4);
-        const __m256d terms = _mm256_cvtps_pd(_mm_loadu_ps(term + j * 4));
-        const __m256d x = _mm256_mul_pd(_mm256_mul_pd(terms, factors), _mm256_broadcast_sd(mass));
-        const __m256i quanta = _mm256_sub_epi64(_mm256_castpd_si256(_mm256_add_pd(x, magic)), zero);
-        const __m256i before = _mm256_loadu_si256(to), after = _mm256_sub_epi64(before, quanta);
-        const __m256i sums = _mm256_add_epi64(ours, quanta);
-        wrong = _mm256_or_si256(wrong, _mm256_and_si256(_mm256_xor_si256(before, quanta),
-                                                        _mm256_xor_si256(before, after)));
-        wrong = _mm256_or_si256(
-            wrong, _mm256_and_si256(_mm256_xor_si256(ours, sums), _mm256_xor_si256(quanta, sums)));
-        good = _mm256_and_pd(good, _mm256_cmp_pd(_mm256_andnot_pd(sign, x), limits, _CMP_LT_OQ));
-        _mm256_storeu_si256(to, after);
-        ours = sums;
-    }
-    _mm256_storeu_si256((__m256i *)own, ours);
-    return _mm256_movemask_pd(_mm256_castsi256_pd(wrong)) == 0 && _mm256_movemask_pd(good) == 15;
+    return _mm256_mul_pd(a, b);
+}
+
+static inline quad load_quad(const double *p)
+{
+    return _mm256_loadu_pd(p);
+}
+
+static inline quad quad_of_floats(const float *p)
+{
+    return _mm256_cvtps_pd(_mm_loadu_ps(p));
+}
+
+static inline given begin_given(const int64_t own[4], double limit)
+{
+    return (given){_mm256_loadu_si256((const __m256i *)own), _mm256_setzero_si256(),
+                   _mm256_castsi256_pd(_mm256_set1_epi64x(-1)), _mm256_set1_pd(limit)};
+}
+
+/* The integers nearest to x to the row, and from the neighbour's sums. */
+static inline void give(given *g, quad x, int64_t *sum)
+{
+    const __m256d magic = _mm256_set1_pd(ROUND_MAGIC), sign = _mm256_set1_pd(-0.0);
+    __m256i *to = (__m256i *)sum;
+    const __m256i quanta =
+        _mm256_sub_epi64(_mm256_castpd_si256(_mm256_add_pd(x, magic)), _mm256_castpd_si256(magic));
+    const __m256i before = _mm256_loadu_si256(to), after = _mm256_sub_epi64(before, quanta);
+    const __m256i sums = _mm256_add_epi64(g->ours, quanta);
+    g->wrong = _mm256_or_si256(g->wrong, _mm256_and_si256(_mm256_xor_si256(before, quanta),
+                                                          _mm256_xor_si256(before, after)));
+    g->wrong = _mm256_or_si256(g->wrong, _mm256_and_si256(_mm256_xor_si256(g->ours, sums),
+                                                          _mm256_xor_si256(quanta, sums)));
+    g->good =
+        _mm256_and_pd(g->good, _mm256_cmp_pd(_mm256_andnot_pd(sign, x), g->limit, _CMP_LT_OQ));
+    _mm256_storeu_si256(to, after);
+    g->ours = sums;
+}
+
+static inline int end_given(const given *g, int64_t own[4])
+{
+    _mm256_storeu_si256((__m256i *)own, g->ours);
+    return _mm256_movemask_pd(_mm256_castsi256_pd(g->wrong)) == 0 &&
+           _mm256_movemask_pd(g->good) == 15;
+}
+
+/* x, y, z of four pairs become four rows of x, y, z, 0. */
+static inline void rows_of_quads(const double *x, const double *y, const double *z, quad to[4])
+{
+    const quad a = load_quad(x), b = load_quad(y), c = load_quad(z), zero = _mm256_setzero_pd();
+    const quad ab0 = _mm256_unpacklo_pd(a, b), ab1 = _mm256_unpackhi_pd(a, b);
+    const quad c0 = _mm256_unpacklo_pd(c, zero), c1 = _mm256_unpackhi_pd(c, zero);
+    to[0] = _mm256_permute2f128_pd(ab0, c0, 0x20);
+    to[1] = _mm256_permute2f128_pd(ab1, c1, 0x20);
+    to[2] = _mm256_permute2f128_pd(ab0, c0, 0x31);
+    to[3] = _mm256_permute2f128_pd(ab1, c1, 0x31);
 }
 #else
+typedef struct quad {
+    double lane[4];
+} quad;
+
+typedef struct given {
+    uint64_t ours[4], wrong;
+    double limit;
+    int good;
+} given;
+
+static inline quad times_quads(quad a, quad b)
+{
+    for (int i = 0; i < 4; i++)
+        a.lane[i] *= b.lane[i];
+    return a;
+}
+
+static inline quad load_quad(const double *p)
+{
+    return (quad){{p[0], p[1], p[2], p[3]}};
+}
+
+static inline quad quad_of_floats(const float *p)
+{
+    return (quad){{(double)p[0], (double)p[1], (double)p[2], (double)p[3]}};
+}
+
+static inline given begin_given(const int64_t own[4], double limit)
+{
+    given g = {.limit = limit, .good = 1};
+    memcpy(g.ours, own, sizeof g.ours);
+    return g;
+}
+
+static inline void give(given *g, quad x, int64_t *sum)
+{
+    const double magic = ROUND_MAGIC;
+    uint64_t zero;
+    memcpy(&zero, &magic, sizeof zero);
+    for (size_t c = 0; c < 4; c++) {
+        const double shifted = x.lane[c] + magic;
+        uint64_t quanta, before;
+        memcpy(&quanta, &shifted, sizeof quanta);
+        quanta -= zero;
+        memcpy(&before, sum + c, sizeof before);
+        const uint64_t after = before - quanta, ours = g->ours[c] + quanta;
+        g->wrong |= (before ^ quanta) & (before ^ after);
+        g->wrong |= (g->ours[c] ^ ours) & (quanta ^ ours);
+        memcpy(sum + c, &after, sizeof after);
+        g->ours[c] = ours;
+        g->good &= fabs(x.lane[c]) < g->limit;
+    }
+}
+
+static inline int end_given(const given *g, int64_t own[4])
+{
+    memcpy(own, g->ours, sizeof g->ours);
+    return g->good && !(g->wrong >> 63);
+}
+
+static inline void rows_of_quads(const double *x, const double *y, const double *z, quad to[4])
+{
+    for (int i = 0; i < 4; i++)
+        to[i] = (quad){{x[i], y[i], z[i], 0.0}};
+}
+#endif
+
 static int pair_impulses(const float *term, const double factor[4], const double *mass,
                          size_t mass_step, double limit, const uint32_t *neighbor, size_t k,
                          int64_t own[4], int64_t *sum)
 {
-    const double magic = ROUND_MAGIC;
-    uint64_t zero, wrong = 0, given[4];
-    int good = 1;
-    memcpy(&zero, &magic, sizeof zero);
-    memcpy(given, own, sizeof given);
+    const quad factors = load_quad(factor);
+    given g = begin_given(own, limit);
     for (size_t j = 0; j < k; j++, mass += mass_step) {
-        int64_t *to = sum + (size_t)neighbor[j] * 4;
-        for (size_t c = 0; c < 4; c++) {
-            const double x = (double)term[j * 4 + c] * factor[c] * *mass;
-            const double shifted = x + magic;
-            uint64_t quanta, before;
-            memcpy(&quanta, &shifted, sizeof quanta);
-            quanta -= zero;
-            memcpy(&before, to + c, sizeof before);
-            const uint64_t after = before - quanta, ours = given[c] + quanta;
-            wrong |= (before ^ quanta) & (before ^ after);
-            wrong |= (given[c] ^ ours) & (quanta ^ ours);
-            memcpy(to + c, &after, sizeof after);
-            given[c] = ours;
-            good &= fabs(x) < limit;
-        }
+        const double m[4] = {*mass, *mass, *mass, *mass};
+        give(&g, times_quads(times_quads(quad_of_floats(term + j * 4), factors), load_quad(m)),
+             sum + (size_t)neighbor[j] * 4);
     }
-    memcpy(own, given, sizeof given);
-    return good && !(wrong >> 63);
+    return end_given(&g, own);
 }
-#endif
+
+static int add_impulses(double impulse[3][ASCC_PAIR_BATCH], double limit, const uint32_t *neighbor,
+                        size_t k, int64_t own[4], int64_t *sum)
+{
+    given g = begin_given(own, limit);
+    for (size_t j = 0; j < k; j += 4) {
+        quad rows[4];
+        rows_of_quads(impulse[0] + j, impulse[1] + j, impulse[2] + j, rows);
+        for (size_t i = 0; i < 4 && j + i < k; i++)
+            give(&g, rows[i], sum + (size_t)neighbor[j + i] * 4);
+    }
+    return end_given(&g, own);
+}
 
 /* ---- Relaxation ---- */
 
@@ -838,11 +1077,12 @@ void ASCC_VARIANT(ascc_kernels *kernels)
     kernels->gather = gather;
     kernels->basis = basis;
     kernels->gather_basis = gather_basis;
-    kernels->pair_strengths = pair_strengths;
+    kernels->pair_lines = pair_lines;
     kernels->moments = moments;
     kernels->multiply = multiply;
     kernels->pair_terms = pair_terms;
     kernels->pair_impulses = pair_impulses;
+    kernels->add_impulses = add_impulses;
     kernels->spline = spline;
     kernels->push = push;
     kernels->divergence = divergence;

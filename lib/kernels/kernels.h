@@ -35,6 +35,25 @@ typedef struct ascc_gradients {
     const float *weight; /* or NULL */
 } ascc_gradients;
 
+/* Pairs of one row that are evaluated together. */
+#define ASCC_PAIR_BATCH 64
+
+/* Rows whose pairs act along the lines to their neighbours: all but the rows' own coefficients. Those are of
+ * each bump strength and damping in turn, 16 numbers, zeros where there are fewer. */
+typedef struct ascc_lines {
+    ascc_coordinates row, neighbor; /* as the network sees them */
+    float inverse_radius;
+    size_t bumps, dimension;
+    int both; /* neighbours are rows of the same set; else they rest, and have no coefficients */
+    const float *coefficient; /* [row][16], if both */
+    const float
+        *motion; /* of rows, a apart: `dimension` numbers are read, 4 loaded; NULL = no damping */
+    size_t a;
+    const double
+        *place; /* [row][3], if both: between these the lines run, turned; NULL = as seen */
+    double factor, limit;
+} ascc_lines;
+
 typedef struct ascc_kernels {
     /* Appends to found[] those of points [begin, end) whose squared distance from (x, y, z) is at
      * most limit (in squared units of the integers); ascending. Returns how many. found has room
@@ -75,10 +94,13 @@ typedef struct ascc_kernels {
                          const uint32_t *neighbor, size_t k, const float *feature, size_t a,
                          float *column);
 
-    /* out[j] = sum over bump < bumps <= 8 of its function of the distance, as in basis, times
-     * (center[bump] + feature[neighbor[j]][bump]); rows of feature are 8 wide, the rest zeros. */
-    void (*pair_strengths)(const float *distance, const uint32_t *neighbor, size_t k,
-                           const float *center, const float *feature, size_t bumps, float *out);
+    /* impulse[c][j] = mass[j * mass_step] * share * line[c], the line from the row to neighbour j < k,
+     * share = factor * strength over the line's length, 0 without one. strength = sum over bumps of its
+     * function of the distance, as in basis, times both sides' coefficients; turned, times the cosine between the line and
+     * the displacement; less as much damping times the speed of approach; cut off at limit. */
+    void (*pair_lines)(const ascc_lines *lines, size_t row, const float own[16],
+                       const uint32_t *neighbor, size_t k, const double *mass, size_t mass_step,
+                       double impulse[3][ASCC_PAIR_BATCH]);
 
     /* sum[bump][8] = sum over the pairs j < k in order of a bump (as in basis, of the distance) times the
      * eight numbers 1, x, y, z, w, each times weight, and d[3]. fluid: d = feature[neighbor[j]] - own; wall: d =
@@ -103,6 +125,10 @@ typedef struct ascc_kernels {
     int (*pair_impulses)(const float *term, const double factor[4], const double *mass,
                          size_t mass_step, double limit, const uint32_t *neighbor, size_t k,
                          int64_t own[4], int64_t *sum);
+
+    /* The same for q(j)[c], the integer nearest to impulse[c][j]; c < 3. */
+    int (*add_impulses)(double impulse[3][ASCC_PAIR_BATCH], double limit, const uint32_t *neighbor,
+                        size_t k, int64_t own[4], int64_t *sum);
 
     /* The cubic spline w = 2 (1 - q)^3 - 8 (1/2 - q)^3, no bracket below 0, of k pairs with unit vectors and
      * distances q (geometry, mapping 3), times volume, or with volumes times volumes[neighbor]: distance

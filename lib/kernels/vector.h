@@ -51,6 +51,12 @@ static inline vector gather_lanes(const float *p, const uint32_t *index)
     return _mm256_i32gather_ps(p, _mm256_loadu_si256((const __m256i *)index), 4);
 }
 
+/* p[index[lane]] of eight floats, indices below 8. */
+static inline vector pick_lanes(const float p[LANES], const int32_t index[LANES])
+{
+    return _mm256_permutevar8x32_ps(_mm256_loadu_ps(p), _mm256_loadu_si256((const __m256i *)index));
+}
+
 /* a * b + c, rounded once. */
 static inline vector fused(vector a, vector b, vector c)
 {
@@ -264,6 +270,14 @@ static inline vector gather_lanes(const float *p, const uint32_t *index)
     return load(lane);
 }
 
+static inline vector pick_lanes(const float p[LANES], const int32_t index[LANES])
+{
+    float lane[LANES];
+    for (int i = 0; i < LANES; i++)
+        lane[i] = p[index[i]];
+    return load(lane);
+}
+
 static inline size_t store_positive(uint32_t *p, uint32_t first, vector a)
 {
     float lane[LANES];
@@ -305,6 +319,30 @@ static inline void transpose_lanes(vector a[LANES])
             to[j][i] = from[i][j];
     for (int i = 0; i < LANES; i++)
         a[i] = load(to[i]);
+#endif
+}
+
+/* Four floats from each of eight places become four vectors of eight. */
+static inline void load_quads(const float *const from[LANES], vector to[4])
+{
+#if defined(ASCC_USE_AVX2)
+    vector a[4];
+    for (int i = 0; i < 4; i++)
+        a[i] = _mm256_insertf128_ps(_mm256_castps128_ps256(_mm_loadu_ps(from[i])),
+                                    _mm_loadu_ps(from[i + 4]), 1);
+    const vector low = _mm256_unpacklo_ps(a[0], a[1]), high = _mm256_unpackhi_ps(a[0], a[1]);
+    const vector low2 = _mm256_unpacklo_ps(a[2], a[3]), high2 = _mm256_unpackhi_ps(a[2], a[3]);
+    to[0] = _mm256_shuffle_ps(low, low2, _MM_SHUFFLE(1, 0, 1, 0));
+    to[1] = _mm256_shuffle_ps(low, low2, _MM_SHUFFLE(3, 2, 3, 2));
+    to[2] = _mm256_shuffle_ps(high, high2, _MM_SHUFFLE(1, 0, 1, 0));
+    to[3] = _mm256_shuffle_ps(high, high2, _MM_SHUFFLE(3, 2, 3, 2));
+#else
+    for (int c = 0; c < 4; c++) {
+        float lane[LANES];
+        for (int i = 0; i < LANES; i++)
+            lane[i] = from[i][c];
+        to[c] = load(lane);
+    }
 #endif
 }
 

@@ -31,7 +31,6 @@ typedef struct ascc_impulse_scale {
 #define ASCC_IMPULSE_LIMIT ((double)((int64_t)1 << 50))
 
 /* Pairs of one row, evaluated together. */
-#define ASCC_PAIR_BATCH 64
 typedef struct ascc_pair_batch {
     size_t count;
     uint32_t neighbor[ASCC_PAIR_BATCH];
