@@ -405,80 +405,65 @@ static void gather_basis(const float *factor, size_t stride, size_t bumps, size_
         }
 }
 
-/* Eight pairs: where they lie among the bumps, and what both bumps that reach them give. */
-typedef struct reached {
-    int32_t low[LANES];
-    float first[LANES], second[LANES];
-} reached;
-
-static inline void find_reached(const float *distance, size_t bumps, reached *out)
-{
-    const vector one = fill(1.0f), zero = fill(0.0f);
-    const vector t = times(load(distance), fill((float)bumps));
-    const vector low = whole(smaller(t, fill((float)(bumps - 1))));
-    const vector f = minus(t, low), g = minus(f, one);
-    const vector u = larger(minus(one, times(f, f)), zero);
-    const vector v = larger(minus(one, times(g, g)), zero);
-    store_whole(out->low, low);
-    store(out->first, times(u, u));
-    store(out->second, times(v, v));
-}
-
-/* The numbers of eight pairs: 1, direction, speed of approach, and the vector of the neighbour. */
+/* The numbers of eight pairs from i on, n of them there: 1, direction, speed of approach, and the vector of the
+ * neighbour; all but that times a weight. */
 static inline void pair_numbers(const ascc_pairs *pairs, size_t i, const uint32_t *neighbor,
                                 size_t n, const float *feature, size_t a, const float own[3],
                                 int wall, size_t dimension, const float *weight, size_t stride,
-                                vector q[LANES])
+                                float number[LANES][LANES])
 {
-    vector v[LANES];
-    for (size_t l = 0; l < LANES; l++)
-        v[l] = load(feature + (size_t)neighbor[i + (l < n ? l : 0)] * a);
-    transpose_lanes(v);
+    const float *from[LANES];
+    float scale[LANES];
+    vector v[4], relative[3];
+    for (size_t l = 0; l < LANES; l++) {
+        const size_t j = neighbor[i + (l < n ? l : 0)];
+        from[l] = feature + j * a;
+        if (weight)
+            scale[l] = weight[j * stride];
+    }
+    load_quads(from, v);
     if (dimension < 3)
         v[2] = fill(0.0f);
-    vector relative[3];
     for (size_t c = 0; c < 3; c++) {
         relative[c] = minus(wall ? fill(0.0f) : v[c], fill(own[c]));
-        v[c] = wall ? v[c] : relative[c];
+        store(number[5 + c], wall ? v[c] : relative[c]);
     }
-    q[0] = fill(1.0f);
-    q[1] = load(pairs->x + i);
-    q[2] = load(pairs->y + i);
-    q[3] = load(pairs->z + i);
-    q[4] = minus(fill(0.0f), add(add(times(q[1], relative[0]), times(q[2], relative[1])),
-                                 times(q[3], relative[2])));
-    if (weight) {
-        float scale[LANES];
-        for (size_t l = 0; l < LANES; l++)
-            scale[l] = weight[neighbor[i + (l < n ? l : 0)] * stride];
-        for (size_t m = 0; m < 5; m++)
-            q[m] = times(q[m], load(scale));
-    }
-    q[5] = v[0];
-    q[6] = v[1];
-    q[7] = v[2];
-    transpose_lanes(q);
+    const vector s = weight ? load(scale) : fill(1.0f);
+    const vector x = load(pairs->x + i), y = load(pairs->y + i), z = load(pairs->z + i);
+    const vector along =
+        add(add(times(x, relative[0]), times(y, relative[1])), times(z, relative[2]));
+    store(number[0], s);
+    store(number[1], times(x, s));
+    store(number[2], times(y, s));
+    store(number[3], times(z, s));
+    store(number[4], times(minus(fill(0.0f), along), s));
 }
 
+/* A lane for each bump: those that a pair does not reach add 0. */
 static void moments(const ascc_pairs *pairs, const uint32_t *neighbor, size_t k,
                     const float *feature, size_t a, const float own[3], int wall, size_t dimension,
                     const float *weight, size_t stride, size_t bumps, float *sum)
 {
-    memset(sum, 0, bumps * LANES * sizeof *sum);
+    static const float lanes[LANES] = {0.0f, 1.0f, 2.0f, 3.0f, 4.0f, 5.0f, 6.0f, 7.0f};
+    const vector bump = load(lanes), count = fill((float)bumps);
+    vector sums[LANES];
+    for (size_t c = 0; c < LANES; c++)
+        sums[c] = fill(0.0f);
     for (size_t i = 0; i < k; i += LANES) {
         const size_t n = k - i < LANES ? k - i : LANES;
-        vector q[LANES];
-        reached r;
-        pair_numbers(pairs, i, neighbor, n, feature, a, own, wall, dimension, weight, stride, q);
-        find_reached(pairs->distance + i, bumps, &r);
-        for (size_t l = 0; l < n; l++) {
-            float *to = sum + (size_t)r.low[l] * LANES;
-            store(to, fused(fill(r.first[l]), q[l], load(to)));
-            to += LANES;
-            if ((size_t)r.low[l] + 1 < bumps)
-                store(to, fused(fill(r.second[l]), q[l], load(to)));
+        float number[LANES][LANES];
+        pair_numbers(pairs, i, neighbor, n, feature, a, own, wall, dimension, weight, stride,
+                     number);
+        UNROLL for (size_t l = 0; l < n; l++)
+        {
+            const vector w = bump_at(fill(pairs->distance[i + l]), count, bump);
+            for (size_t c = 0; c < LANES; c++)
+                sums[c] = fused(w, fill(number[c][l]), sums[c]);
         }
     }
+    transpose_lanes(sums);
+    for (size_t b = 0; b < bumps; b++)
+        store(sum + b * LANES, sums[b]);
 }
 
 /* out[rows][vectors * 8] += in * weight with all sums in registers. */

@@ -46,11 +46,14 @@ typedef struct ascc_lines {
     size_t bumps, dimension;
     int both; /* neighbours are rows of the same set; else they rest, and have no coefficients */
     const float *coefficient; /* [row][16], if both */
-    const float
-        *motion; /* of rows, a apart: `dimension` numbers are read, 4 loaded; NULL = no damping */
+    /* Motions of rows, a apart: `dimension` numbers are read, but 4 loaded; NULL = no damping. */
+    const float *motion;
     size_t a;
-    const double
-        *place; /* [row][3], if both: between these the lines run, turned; NULL = as seen */
+    /* Of neighbours, so far apart, what strength and damping are multiplied by; NULL = 1. */
+    const float *area;
+    size_t area_stride;
+    /* [row][3], if both: between these the lines run, turned; NULL = as seen. */
+    const double *place;
     double factor, limit;
 } ascc_lines;
 
@@ -105,7 +108,7 @@ typedef struct ascc_kernels {
     /* sum[bump][8] = sum over the pairs j < k in order of a bump (as in basis, of the distance) times the
      * eight numbers 1, x, y, z, w, each times weight, and d[3]. fluid: d = feature[neighbor[j]] - own; wall: d =
      * feature[neighbor[j]]; w, the speed of approach, is -(d . xyz), of a wall own . xyz. One chain of
-     * fma a bump. feature rows are a >= 8 apart, of which `dimension` numbers are read (but 8 are loaded);
+     * fma a number. feature rows are a apart, of which `dimension` numbers are read (but 4 are loaded);
      * weight[neighbor[j] * stride], NULL = 1. With 2 dimensions z and d[2] are 0. */
     void (*moments)(const ascc_pairs *pairs, const uint32_t *neighbor, size_t k,
                     const float *feature, size_t a, const float own[3], int wall, size_t dimension,
