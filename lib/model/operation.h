@@ -85,6 +85,8 @@ typedef struct ascc_operation {
     void (*scratch)(const ascc_plan *plan, const ascc_term *term, ascc_scratch_sizes *sizes);
     /* It reads the fluid's features besides its source. NULL = never. */
     bool (*reads_features)(const ascc_term *term);
+    /* It can read its rows from a tile, ascc_tile.given, before their value is stored. */
+    bool reads_tiles;
 
     /* ---- Running ---- */
 

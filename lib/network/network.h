@@ -27,6 +27,7 @@ typedef struct ascc_network {
     int32_t relaxation_key[2]; /* fluid and walls around the fluid; -1 = there is no relaxation */
     uint8_t *wants;            /* [value_count] ASCC_WANTS_* */
     int32_t max_neighbors;     /* of a point, before LIMIT */
+    bool keeps_values;         /* also those that readers are given tile by tile: for a way back */
 } ascc_network;
 
 ascc_status ascc_network_create(ascc_network *network, const ascc_allocator *allocator,
@@ -73,6 +74,9 @@ ascc_status ascc_network_demand(ascc_network_run *run, const ascc_network *netwo
 ascc_status ascc_network_forward(ascc_network_run *run, const float *fluid_features,
                                  const float *boundary_features);
 
+/* Is the value of a layer given to its readers tile by tile, and never stored? */
+bool ascc_network_passes_on(const ascc_network *network, int32_t layer);
+
 /* ---- What operations read ---- */
 
 /* Rows of a layer that are computed together: their columns share one pass over the weights. */
@@ -91,6 +95,9 @@ typedef struct ascc_tile {
     float *scratch; /* as the operation asked for */
     size_t room;
     const uint32_t *sequence; /* 0, 1, 2, ... [room] */
+    const float
+        *given; /* rows of the source as they come, given_width apart; NULL = from its value */
+    size_t given_width;
 } ascc_tile;
 
 /* The value that a term reads, rectified if it wants that. */

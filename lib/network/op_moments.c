@@ -152,11 +152,17 @@ static void sum_row(const ascc_tile *tile, const ascc_term *term, int list, size
                                  areas_of(run, list), stride, (size_t)filter.bumps, sum);
 }
 
-/* The numbers of a bump without those that a plane does not have. */
-static float *write_bump(const float from[8], int32_t dimension, float *to)
+/* The numbers of bumps, in a plane without those that it does not have. Returns where they end. */
+static float *add_bumps(const float *restrict from, int32_t bumps, int32_t dimension,
+                        float *restrict to)
 {
-    for (int n = 0; n < 8; n++)
-        if (dimension == 3 || (n != 3 && n != 7))
+    if (dimension == 3) {
+        for (int32_t n = 0; n < 8 * bumps; n++)
+            to[n] += from[n];
+        return to + 8 * bumps;
+    }
+    for (int32_t n = 0; n < 8 * bumps; n++)
+        if (n % 8 != 3 && n % 8 != 7)
             *to++ += from[n];
     return to;
 }
@@ -170,8 +176,7 @@ static void forward(const ascc_tile *tile, const ascc_term *term)
             float sum[ASCC_MAX_BUMPS * 8];
             const int32_t bumps = list ? wall_bumps(term) : term->filter.bumps;
             sum_row(tile, term, list, tile->list[r], sum);
-            for (int32_t b = 0; b < bumps; b++)
-                to = write_bump(sum + b * 8, dimension, to);
+            to = add_bumps(sum, bumps, dimension, to);
         }
     }
 }

@@ -102,7 +102,9 @@ static double value_bytes(const ascc_network *network, double fluid, double boun
 {
     double bytes = 0.0;
     for (int32_t v = 0; v < network->value_count; v++) {
-        const double copies = 4.0 * ((network->wants[v] & 1) + (network->wants[v] >> 1 & 1));
+        const bool stored = v < 2 || !ascc_network_passes_on(network, v - 2);
+        const double copies =
+            stored ? 4.0 * ((network->wants[v] & 1) + (network->wants[v] >> 1 & 1)) : 0.0;
         bytes += set_points(network->plan, ascc_network_set(network, v), fluid, boundary) *
                  (1.0 + copies * (double)ascc_padded(ascc_network_channels(network, v)));
     }
