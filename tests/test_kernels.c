@@ -980,12 +980,13 @@ static void sweeps_equal_doubles_and_have_the_same_bits_on_every_cpu(void **stat
                                       .g = {g[0], g[1], g[2]},
                                       .weight = weighted ? weight : NULL};
         for (int t = 0; t < count; t++) {
-            static float move[3][SWEPT], change[SWEPT];
-            float *const to[3] = {move[0], move[1], move[2]};
+            static float move[3][SWEPT], change[SWEPT], to[SWEPT * 4];
             table[t].push(&pairs, 0, 25, pressure, own, to);
             table[t].push(&pairs, 25, SWEPT, pressure, own, to);
             table[t].divergence(&pairs, 0, 31, own, to, change);
             table[t].divergence(&pairs, 31, SWEPT, own, to, change);
+            for (size_t i = 0; i < SWEPT * 3; i++)
+                move[i % 3][i / 3] = to[i / 3 * 4 + i % 3];
             for (size_t i = 0; i < SWEPT; i++) {
                 double sum = 0.0, size = 1.0;
                 for (int c = 0; c < 3; c++) {
@@ -1013,6 +1014,134 @@ static void sweeps_equal_doubles_and_have_the_same_bits_on_every_cpu(void **stat
     }
 }
 
+static void kept_gradients_are_those_that_are_not_0_on_every_cpu(void **state)
+{
+    (void)state;
+    ascc_kernels table[16];
+    const int count = tables(table);
+    for (size_t k = 0; k < 70; k++) {
+        const size_t room = (k + 7) / 8 * 8;
+        float *from[3] = {floats(room), floats(room), floats(room)};
+        uint32_t neighbor[70];
+        for (size_t i = 0; i < k; i++) {
+            neighbor[i] = next();
+            for (int c = 0; c < 3; c++)
+                if (next() % 3 || k % 5 == 1)
+                    from[c][i] = i % 2 ? 0.0f : -0.0f;
+        }
+        const ascc_pairs pairs = {.x = from[0], .y = from[1], .z = from[2]};
+        for (int t = 0; t < count; t++) {
+            float *g[3] = {guarded(room), guarded(room), guarded(room)};
+            uint32_t to[72];
+            const size_t got = table[t].keep_gradients(&pairs, neighbor, k, 777, to, g);
+            size_t at = 0;
+            for (size_t i = 0; i < k; i++) {
+                if (from[0][i] == 0.0f && from[1][i] == 0.0f && from[2][i] == 0.0f)
+                    continue;
+                assert_true(at < got && to[at] == neighbor[i]);
+                for (int c = 0; c < 3; c++)
+                    assert_true(g[c][at] == from[c][i]);
+                at++;
+            }
+            assert_int_equal(got, (at + 7) / 8 * 8);
+            for (; at < got; at++)
+                assert_true(to[at] == 777 && g[0][at] == 0.0f && g[1][at] == 0.0f &&
+                            g[2][at] == 0.0f);
+            for (int c = 0; c < 3; c++) {
+                check_guard(g[c], room);
+                free(g[c]);
+            }
+        }
+        for (int c = 0; c < 3; c++)
+            free(from[c]);
+    }
+}
+
+/* Pairs of a row with rows after it, in doubles. */
+static void press_in_doubles(const ascc_gradients *pairs, const ascc_pressures *p, size_t row,
+                             double (*sum)[3])
+{
+    for (size_t k = pairs->start[row]; k < pairs->end[row]; k++) {
+        const size_t j = pairs->neighbor[k];
+        const double both = (double)p->pressure[row] + (double)p->pressure[j];
+        const double a = p->mass[p->uniform ? 0 : row], b = p->mass[p->uniform ? 0 : j];
+        double x[3], size = 0.0, along = 0.0, square = 0.0;
+        for (size_t c = 0; c < 3; c++) {
+            x[c] = -both * (double)pairs->g[c][k];
+            size += x[c] * x[c];
+        }
+        for (size_t c = 0; c < 3; c++) {
+            x[c] *= fmin(1.0, (double)p->limit / sqrt(size));
+            if (p->place) {
+                const double line = p->place[j * 3 + c] - p->place[row * 3 + c];
+                along += line * x[c];
+                square += line * line;
+            }
+        }
+        for (size_t c = 0; j > row && c < 3; c++) {
+            if (p->place)
+                x[c] = along / square * (p->place[j * 3 + c] - p->place[row * 3 + c]);
+            const double impulse = x[c] * p->factor * 2.0 * a * b / (a + b);
+            sum[row][c] += impulse;
+            sum[j][c] -= impulse;
+        }
+    }
+}
+
+static void pressure_impulses_equal_doubles_and_have_the_same_bits_on_every_cpu(void **state)
+{
+    (void)state;
+    enum { ROWS = 90, LONGEST = 88 }; /* rows of more than one batch */
+    ascc_kernels table[16];
+    const int count = tables(table);
+    static float g[3][ROWS * LONGEST], pressure[ROWS];
+    static uint32_t neighbor[ROWS * LONGEST];
+    static double mass[ROWS], place[ROWS * 3];
+    size_t start[ROWS], end[ROWS];
+    for (size_t i = 0; i < ROWS; i++) {
+        const size_t pairs = i % 3 ? next() % 40 : LONGEST - 3;
+        start[i] = i * LONGEST;
+        end[i] = start[i] + (pairs + 7) / 8 * 8;
+        for (size_t k = 0; k < end[i] - start[i]; k++) {
+            neighbor[start[i] + k] = k < pairs ? (uint32_t)((i + 1 + k) % ROWS) : (uint32_t)i;
+            for (int c = 0; c < 3; c++)
+                g[c][start[i] + k] = k < pairs ? uniform() : 0.0f;
+        }
+        pressure[i] = next() % 3 ? fabsf(uniform()) : 0.0f;
+        mass[i] = 1.5 + (double)uniform();
+        for (int c = 0; c < 3; c++)
+            place[i * 3 + (size_t)c] = (double)uniform();
+    }
+    const ascc_gradients pairs = {
+        .start = start, .end = end, .neighbor = neighbor, .g = {g[0], g[1], g[2]}};
+    for (int options = 0; options < 8; options++) {
+        static double want[ROWS][3];
+        static int64_t first[ROWS * 4], got[ROWS * 4];
+        const ascc_pressures p = {.pressure = pressure,
+                                  .limit = options & 1 ? 0.5f : 100.0f,
+                                  .factor = 1e9,
+                                  .mass = mass,
+                                  .uniform = options & 2,
+                                  .place = options & 4 ? place : NULL};
+        memset(want, 0, sizeof want);
+        for (size_t i = 0; i < ROWS; i++)
+            press_in_doubles(&pairs, &p, i, want);
+        for (int t = 0; t < count; t++) {
+            memset(got, 0, sizeof got);
+            for (size_t i = 0; i < ROWS; i++)
+                assert_int_equal(table[t].pressure_impulses(&pairs, &p, i, 0x1p50, got), 1);
+            for (size_t i = 0; i < ROWS * 4;
+                 i++) /* some 200 impulses of up to 1e10, 4 roundings each */
+                assert_true(i % 4 == 3 ? got[i] == 0
+                                       : fabs((double)got[i] - want[i / 4][i % 4]) < 2e5);
+            if (t == 0)
+                memcpy(first, got, sizeof got);
+            assert_memory_equal(first, got, sizeof got);
+        }
+        assert_int_equal(table[0].pressure_impulses(&pairs, &p, 0, 1.0, got), 0);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -1031,6 +1160,8 @@ int main(void)
         cmocka_unit_test(pair_terms_equal_doubles_and_have_the_same_bits_on_every_cpu),
         cmocka_unit_test(pair_impulses_are_the_nearest_integers_on_every_cpu),
         cmocka_unit_test(an_impulse_that_does_not_fit_is_told_on_every_cpu),
+        cmocka_unit_test(kept_gradients_are_those_that_are_not_0_on_every_cpu),
+        cmocka_unit_test(pressure_impulses_equal_doubles_and_have_the_same_bits_on_every_cpu),
         cmocka_unit_test(the_spline_equals_doubles_and_has_the_same_bits_on_every_cpu),
         cmocka_unit_test(sweeps_equal_doubles_and_have_the_same_bits_on_every_cpu),
     };

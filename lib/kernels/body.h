@@ -964,8 +964,36 @@ static void spline(const ascc_pairs *pairs, const uint32_t *neighbor, size_t k, 
     sum[7] = 0.0f;
 }
 
+static size_t keep_gradients(const ascc_pairs *pairs, const uint32_t *neighbor, size_t k,
+                             uint32_t row, uint32_t *to, float *const g[3])
+{
+    size_t count = 0;
+    for (size_t i = 0; i < k; i += LANES) {
+        const vector x = load(pairs->x + i), y = load(pairs->y + i), z = load(pairs->z + i);
+        const unsigned there = k - i < LANES ? (1u << (k - i)) - 1 : 255u;
+        const kept lanes = kept_lanes(not_zero(x, y, z) & there);
+        uint32_t last[LANES];
+        const uint32_t *from = neighbor + i;
+        if (k - i < LANES) {
+            memcpy(last, from, (k - i) * sizeof *from);
+            memset(last + (k - i), 0, (LANES - (k - i)) * sizeof *last);
+            from = last;
+        }
+        store_kept_integers(to + count, from, lanes);
+        store_kept(g[0] + count, x, lanes);
+        store_kept(g[1] + count, y, lanes);
+        store_kept(g[2] + count, z, lanes);
+        count += lanes.count;
+    }
+    for (; count % LANES; count++) {
+        to[count] = row;
+        g[0][count] = g[1][count] = g[2][count] = 0.0f;
+    }
+    return count;
+}
+
 static void push(const ascc_gradients *pairs, size_t begin, size_t end, const float *pressure,
-                 float *const own[3], float *const move[3])
+                 float *const own[3], float *move)
 {
     for (size_t i = begin; i < end; i++) {
         vector x = fill(0.0f), y = x, z = x;
@@ -980,21 +1008,103 @@ static void push(const ascc_gradients *pairs, size_t begin, size_t end, const fl
         float sum[4];
         store_totals(sum, x, y, z);
         for (size_t c = 0; c < 3; c++)
-            move[c][i] = -(pressure[i] * own[c][i] + sum[c]);
+            move[i * 4 + c] = -(pressure[i] * own[c][i] + sum[c]);
+        move[i * 4 + 3] = 0.0f;
     }
 }
 
 static void divergence(const ascc_gradients *pairs, size_t begin, size_t end, float *const own[3],
-                       float *const move[3], float *change)
+                       const float *move, float *change)
 {
     for (size_t i = begin; i < end; i++) {
         vector sum = fill(0.0f);
-        for (size_t k = pairs->start[i]; k < pairs->end[i]; k += LANES)
+        for (size_t k = pairs->start[i]; k < pairs->end[i]; k += LANES) {
+            const float *from[LANES];
+            vector v[4];
+            for (size_t l = 0; l < LANES; l++)
+                from[l] = move + (size_t)pairs->neighbor[k + l] * 4;
+            load_quads(from, v);
             for (size_t c = 0; c < 3; c++)
-                sum = fused(load(pairs->g[c] + k), gather_lanes(move[c], pairs->neighbor + k), sum);
-        change[i] =
-            own[0][i] * move[0][i] + own[1][i] * move[1][i] + own[2][i] * move[2][i] - total(sum);
+                sum = fused(load(pairs->g[c] + k), v[c], sum);
+        }
+        const float *m = move + i * 4;
+        change[i] = own[0][i] * m[0] + own[1][i] * m[1] + own[2][i] * m[2] - total(sum);
     }
+}
+
+/* Turned to lie along the lines between the places: no torque about these. */
+static void turn_terms(const double *place, size_t row, const uint32_t *neighbor, size_t k,
+                       float term[3][ASCC_PAIR_BATCH + LANES])
+{
+    const double *here = place + row * 3;
+    for (size_t i = 0; i < k; i++) {
+        const double *there = place + (size_t)neighbor[i] * 3;
+        double line[3], square = 0.0, along = 0.0;
+        for (size_t c = 0; c < 3; c++) {
+            line[c] = there[c] - here[c];
+            square += line[c] * line[c];
+            along += line[c] * (double)term[c][i];
+        }
+        for (size_t c = 0; c < 3; c++)
+            term[c][i] = square > 0.0 ? (float)(along / square * line[c]) : 0.0f;
+    }
+}
+
+/* Gradients of k pairs become what their pressures make of them. */
+static void press(const ascc_pressures *p, size_t row, const uint32_t *neighbor, size_t k,
+                  float g[3][ASCC_PAIR_BATCH + LANES])
+{
+    float *RESTRICT x = g[0], *RESTRICT y = g[1], *RESTRICT z = g[2];
+    const float most = p->limit;
+    const vector own = fill(p->pressure[row]);
+    float both[ASCC_PAIR_BATCH + LANES];
+    for (size_t i = 0; i < k; i += LANES)
+        store(both + i, minus(fill(0.0f), add(own, gather_lanes(p->pressure, neighbor + i))));
+    for (size_t i = 0; i < k; i++) {
+        const float tx = both[i] * x[i], ty = both[i] * y[i], tz = both[i] * z[i];
+        const float size = tx * tx + ty * ty + tz * tz;
+        const float share = size > most * most ? most / sqrtf(size) : 1.0f;
+        x[i] = tx * share;
+        y[i] = ty * share;
+        z[i] = tz * share;
+    }
+    if (p->place)
+        turn_terms(p->place, row, neighbor, k, g);
+}
+
+static int pressure_impulses(const ascc_gradients *pairs, const ascc_pressures *p, size_t row,
+                             double limit, int64_t *sum)
+{
+    int good = 1;
+    for (size_t k = pairs->start[row]; k < pairs->end[row]; k += ASCC_PAIR_BATCH) {
+        const size_t stop =
+            pairs->end[row] - k < ASCC_PAIR_BATCH ? pairs->end[row] : k + ASCC_PAIR_BATCH;
+        uint32_t near[ASCC_PAIR_BATCH + LANES];
+        float g[3][ASCC_PAIR_BATCH + LANES];
+        double impulse[3][ASCC_PAIR_BATCH];
+        size_t n = 0;
+        for (size_t i = k; i < stop; i += LANES) {
+            const kept after = kept_lanes(above(pairs->neighbor + i, (uint32_t)row));
+            store_kept_integers(near + n, pairs->neighbor + i, after);
+            for (size_t c = 0; c < 3; c++)
+                store_kept(g[c] + n, load(pairs->g[c] + i), after);
+            n += after.count;
+        }
+        for (size_t i = n; i % LANES; i++)
+            near[i] = (uint32_t)row;
+        press(p, row, near, n, g);
+        const double a = p->mass[p->uniform ? 0 : row];
+        for (size_t c = 0; c < 3; c++)
+            for (size_t i = 0; i < n; i++)
+                impulse[c][i] = (double)g[c][i] * p->factor * a;
+        for (size_t i = 0; !p->uniform && i < n; i++) {
+            const double b = p->mass[near[i]], mass = a == b ? a : 2.0 * (a * b) / (a + b);
+            for (size_t c = 0; c < 3; c++)
+                impulse[c][i] = (double)g[c][i] * p->factor * mass;
+        }
+        good &= add_impulses(impulse, limit, near, n, sum + row * 4, sum);
+    }
+    return good;
 }
 
 /* ---- The way back, in training ---- */
@@ -1069,8 +1179,10 @@ void ASCC_VARIANT(ascc_kernels *kernels)
     kernels->pair_impulses = pair_impulses;
     kernels->add_impulses = add_impulses;
     kernels->spline = spline;
+    kernels->keep_gradients = keep_gradients;
     kernels->push = push;
     kernels->divergence = divergence;
+    kernels->pressure_impulses = pressure_impulses;
     kernels->scatter = scatter;
     kernels->dot = dot;
 }

@@ -35,6 +35,16 @@ typedef struct ascc_gradients {
     const float *weight; /* or NULL */
 } ascc_gradients;
 
+/* What pressures give pairs: see pressure_impulses. */
+typedef struct ascc_pressures {
+    const float *pressure; /* of rows */
+    float limit;
+    double factor;
+    const double *mass;  /* of rows, or of all */
+    int uniform;         /* the latter */
+    const double *place; /* [row][3] or NULL */
+} ascc_pressures;
+
 /* Pairs of one row that are evaluated together. */
 #define ASCC_PAIR_BATCH 64
 
@@ -140,14 +150,26 @@ typedef struct ascc_kernels {
     void (*spline)(const ascc_pairs *pairs, const uint32_t *neighbor, size_t k, float volume,
                    const float *volumes, float sum[8]);
 
-    /* Of rows [begin, end): move[c][i] = -(pressure[i] own[c][i] + sum over pairs of weight
-     * pressure[neighbor] g[c]); a pair's weight is 1 without weights. 8 partial sums by pair mod 8. */
+    /* Keeps of a row's k pairs those whose x, y, z are not all 0: in order, neighbours at `to`, filled up to a
+     * multiple of 8 with the row and zeros; returns how many that makes. Room for k, filled up likewise. */
+    size_t (*keep_gradients)(const ascc_pairs *pairs, const uint32_t *neighbor, size_t k,
+                             uint32_t row, uint32_t *to, float *const g[3]);
+
+    /* Of rows [begin, end): move[i][c] = -(pressure[i] own[c][i] + sum over pairs of weight
+     * pressure[neighbor] g[c]); a pair's weight is 1 without weights. 8 partial sums by pair mod 8.
+     * Rows of move are 4 wide. */
     void (*push)(const ascc_gradients *pairs, size_t begin, size_t end, const float *pressure,
-                 float *const own[3], float *const move[3]);
+                 float *const own[3], float *move);
 
     /* Of rows [begin, end): change[i] = own[i] . move[i] - sum over pairs of g . move[neighbor]. */
     void (*divergence)(const ascc_gradients *pairs, size_t begin, size_t end, float *const own[3],
-                       float *const move[3], float *change);
+                       const float *move, float *change);
+
+    /* Pairs of a row with neighbours after it: impulses -(both pressures) g, cut off at limit, turned into
+     * the line between their places, times factor and the masses that ascc_pair_mass makes of both. Added to the
+     * row's sums and taken from the neighbours', [row][4], as add_impulses does, with its limit of quanta. */
+    int (*pressure_impulses)(const ascc_gradients *pairs, const ascc_pressures *pressures,
+                             size_t row, double limit, int64_t *sum);
 
     /* Of the way back: gradient[neighbor[i]][a] += sum over members m of factor[m * stride + i] *
      * column[m][a], pairs in order; members come in bumps of so many harmonics, and a bump whose

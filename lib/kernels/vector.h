@@ -90,15 +90,55 @@ static inline void store_whole(int32_t *p, vector a)
     _mm256_storeu_si256((__m256i *)p, _mm256_cvttps_epi32(a));
 }
 
-/* first + the numbers of the set bits of a byte, lowest first; returns how many. p has room for 8. */
-static inline size_t store_lanes(uint32_t *p, uint32_t first, unsigned mask)
+/* Which lanes are not 0 in any of three, and which integers are above another, all below 2^31: a bit each. */
+static inline unsigned not_zero(vector a, vector b, vector c)
+{
+    const __m256 zero = _mm256_setzero_ps();
+    const __m256 ab =
+        _mm256_or_ps(_mm256_cmp_ps(a, zero, _CMP_NEQ_UQ), _mm256_cmp_ps(b, zero, _CMP_NEQ_UQ));
+    return (unsigned)_mm256_movemask_ps(_mm256_or_ps(ab, _mm256_cmp_ps(c, zero, _CMP_NEQ_UQ)));
+}
+
+static inline unsigned above(const uint32_t *p, uint32_t least)
+{
+    const __m256i more =
+        _mm256_cmpgt_epi32(_mm256_loadu_si256((const __m256i *)p), _mm256_set1_epi32((int)least));
+    return (unsigned)_mm256_movemask_ps(_mm256_castsi256_ps(more));
+}
+
+/* The set bits of such a byte: their numbers, lowest first, and how many. */
+typedef struct kept {
+    __m256i lane;
+    size_t count;
+} kept;
+
+static inline kept kept_lanes(unsigned mask)
 {
     const __m256i nibble = _mm256_setr_epi32(0, 4, 8, 12, 16, 20, 24, 28);
     const uint32_t packed = _pext_u32(0x76543210u, _pdep_u32(mask, 0x11111111u) * 0xfu);
-    const __m256i lanes = _mm256_and_si256(
-        _mm256_srlv_epi32(_mm256_set1_epi32((int)packed), nibble), _mm256_set1_epi32(7));
-    _mm256_storeu_si256((__m256i *)p, _mm256_add_epi32(_mm256_set1_epi32((int)first), lanes));
-    return (size_t)_mm_popcnt_u32(mask);
+    const __m256i lane = _mm256_and_si256(_mm256_srlv_epi32(_mm256_set1_epi32((int)packed), nibble),
+                                          _mm256_set1_epi32(7));
+    return (kept){lane, (size_t)_mm_popcnt_u32(mask)};
+}
+
+/* Those lanes first; what comes after them does not matter. */
+static inline void store_kept(float *p, vector a, kept k)
+{
+    _mm256_storeu_ps(p, _mm256_permutevar8x32_ps(a, k.lane));
+}
+
+static inline void store_kept_integers(uint32_t *p, const uint32_t *from, kept k)
+{
+    _mm256_storeu_si256((__m256i *)p, _mm256_permutevar8x32_epi32(
+                                          _mm256_loadu_si256((const __m256i *)from), k.lane));
+}
+
+/* first + the numbers of the set bits of a byte, lowest first; returns how many. p has room for 8. */
+static inline size_t store_lanes(uint32_t *p, uint32_t first, unsigned mask)
+{
+    const kept k = kept_lanes(mask);
+    _mm256_storeu_si256((__m256i *)p, _mm256_add_epi32(_mm256_set1_epi32((int)first), k.lane));
+    return k.count;
 }
 
 /* first + the numbers of the lanes above 0, ascending; returns how many. p has room for 8. */
@@ -268,6 +308,56 @@ static inline vector gather_lanes(const float *p, const uint32_t *index)
     for (int i = 0; i < LANES; i++)
         lane[i] = p[index[i]];
     return load(lane);
+}
+
+static inline unsigned not_zero(vector a, vector b, vector c)
+{
+    float lane[3][LANES];
+    unsigned mask = 0;
+    store(lane[0], a);
+    store(lane[1], b);
+    store(lane[2], c);
+    for (int i = 0; i < LANES; i++)
+        mask |= (unsigned)(lane[0][i] != 0.0f || lane[1][i] != 0.0f || lane[2][i] != 0.0f) << i;
+    return mask;
+}
+
+static inline unsigned above(const uint32_t *p, uint32_t least)
+{
+    unsigned mask = 0;
+    for (int i = 0; i < LANES; i++)
+        mask |= (unsigned)(p[i] > least) << i;
+    return mask;
+}
+
+typedef struct kept {
+    int lane[LANES];
+    size_t count;
+} kept;
+
+static inline kept kept_lanes(unsigned mask)
+{
+    kept k = {{0}, 0};
+    for (int i = 0; i < LANES; i++)
+        if (mask >> i & 1)
+            k.lane[k.count++] = i;
+    return k;
+}
+
+static inline void store_kept(float *p, vector a, kept k)
+{
+    float lane[LANES];
+    store(lane, a);
+    for (int i = 0; i < LANES; i++)
+        p[i] = lane[k.lane[i]];
+}
+
+static inline void store_kept_integers(uint32_t *p, const uint32_t *from, kept k)
+{
+    uint32_t lane[LANES];
+    memcpy(lane, from, sizeof lane);
+    for (int i = 0; i < LANES; i++)
+        p[i] = lane[k.lane[i]];
 }
 
 static inline vector pick_lanes(const float p[LANES], const int32_t index[LANES])

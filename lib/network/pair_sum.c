@@ -177,11 +177,14 @@ static void evaluate_chunks(void *data, size_t begin, size_t end, int32_t slot)
     for (size_t c = begin; c < end; c++) {
         const size_t first = (c * 3 + sum->phase) * sum->chunk;
         size_t pairs = 0;
-        for (size_t i = first; i < ascc_min_size(first + sum->chunk, count); i++)
+        for (size_t i = first; i < ascc_min_size(first + sum->chunk, count); i++) {
+            if (sum->whole && sum->whole(sum, i))
+                continue;
             if (sum->set == ASCC_SET_FLUID)
                 pairs += evaluate_row(sum, i);
             else if (sum->fluid[i])
                 pairs += evaluate_mixed_row(sum, i);
+        }
         atomic_fetch_add_explicit(&sum->pairs, pairs, memory_order_relaxed);
     }
 }

@@ -55,6 +55,8 @@ typedef struct ascc_pair_sum {
     size_t stride;
     int64_t *wall;    /* [boundary rows of the host][dimension] */
     const void *data; /* the function's own */
+    /* Evaluates all pairs of row i of a set of fluid at once, if it can; else, or NULL: batch by batch. */
+    bool (*whole)(struct ascc_pair_sum *sum, size_t i);
 
     /* Under way: */
     const ascc_rows *rows;

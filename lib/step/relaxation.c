@@ -38,9 +38,10 @@ typedef struct relaxation {
     size_t *start, *end; /* [count + 1], [count] */
     uint32_t *neighbor;
     float *g[3], *weight;
-    float *own[3];  /* sum of g, walls included */
-    float *push[3]; /* the same by weight */
-    float *excess, *response, *pressure, *change, *move[3];
+    float *own[3];                                       /* sum of g, walls included */
+    float *push[3];                                      /* the same by weight */
+    float *excess, *response, *pressure, *change, *move; /* move: rows of 4 */
+    uint8_t *near;       /* rows with neighbours within the repulsion */
     const float *guess;  /* [count][padded] of pressures, times D_lattice; NULL = 0 */
     const double *place; /* [count][3] before the step, if corrections lie along those lines */
     float *scratch;      /* [slots][4][room] */
@@ -106,8 +107,9 @@ static bool lend_memory(relaxation *r)
         room &= (r->low[c] = ascc_arena_lend(arena, n, sizeof(int32_t))) != NULL;
     r->start = ascc_arena_lend(arena, n, sizeof *r->start);
     r->end = ascc_arena_lend(arena, n, sizeof *r->end);
-    if (!room || !r->start || !r->end || !lend_vector(arena, r->own, n) ||
-        !lend_vector(arena, r->move, n))
+    r->move = ascc_arena_lend(arena, n, 4 * sizeof *r->move);
+    r->near = ascc_arena_lend(arena, n, 1);
+    if (!room || !r->start || !r->end || !r->move || !r->near || !lend_vector(arena, r->own, n))
         return false;
     const size_t pairs = place_rows(r);
     r->room = whole_vectors(ascc_max_size(r->rows->longest, r->wall_rows->longest));
@@ -154,8 +156,17 @@ static void find_places(void *data, size_t begin, size_t end, int32_t slot)
         }
 }
 
-/* Gradients of a row's pairs into scratch; sums as the kernel gives them. */
-static ascc_pairs look(const relaxation *r, size_t i, const ascc_rows *rows,
+/* Is there another particle within the repulsion? The row itself is among its neighbours. */
+static uint8_t has_near(const relaxation *r, const float *distance, size_t count)
+{
+    size_t near = 0;
+    for (size_t k = 0; k < count; k++)
+        near += distance[k] < r->repulsion;
+    return near > 1;
+}
+
+/* Gradients of a row's pairs into scratch; sums as the kernel gives them. near: NULL of walls. */
+static ascc_pairs look(const relaxation *r, size_t i, const ascc_rows *rows, uint8_t *near,
                        int32_t *const source[3], const float *volumes, float *scratch, float sum[8])
 {
     const ascc_kernels *kernels = r->state->tools.kernels;
@@ -167,27 +178,10 @@ static ascc_pairs look(const relaxation *r, size_t i, const ascc_rows *rows,
                               .distance = scratch + 3 * r->room};
     kernels->geometry(&points, neighbor, rows->count[i], r->low[0][i], r->low[1][i], r->low[2][i],
                       r->inverse_support, ASCC_MAPPING_DIRECTION, &pairs);
+    if (near)
+        *near = has_near(r, pairs.distance, rows->count[i]);
     kernels->spline(&pairs, neighbor, rows->count[i], (float)r->constants->amount, volumes, sum);
     return pairs;
-}
-
-/* Keeps the pairs of a row that act. */
-static void keep(relaxation *r, size_t i, const ascc_pairs *pairs)
-{
-    const uint32_t *neighbor = r->rows->neighbor + r->rows->start[i];
-    size_t at = r->start[i];
-    for (size_t k = 0; k < r->rows->count[i]; k++) {
-        r->neighbor[at] = neighbor[k];
-        r->g[0][at] = pairs->x[k];
-        r->g[1][at] = pairs->y[k];
-        r->g[2][at] = pairs->z[k];
-        at += pairs->x[k] != 0.0f || pairs->y[k] != 0.0f || pairs->z[k] != 0.0f;
-    }
-    for (r->end[i] = at; (r->end[i] - r->start[i]) % 8; r->end[i]++) {
-        r->neighbor[r->end[i]] = (uint32_t)i;
-        for (int c = 0; c < 3; c++)
-            r->g[c][r->end[i]] = 0.0f;
-    }
 }
 
 /* Of unequal masses: a pair pushes row i by twice the other's share of both masses. Returns D. */
@@ -220,10 +214,14 @@ static void look_around(void *data, size_t begin, size_t end, int32_t slot)
     int32_t *const *walls = r->state->hierarchy.set[ASCC_SET_BOUNDARY].low;
     for (size_t i = begin; i < end; i++) {
         float sum[8], wall[8] = {0};
-        const ascc_pairs pairs = look(r, i, r->rows, r->low, NULL, scratch, sum);
-        keep(r, i, &pairs);
+        const ascc_pairs pairs = look(r, i, r->rows, &r->near[i], r->low, NULL, scratch, sum);
+        const size_t at = r->start[i];
+        float *const g[3] = {r->g[0] + at, r->g[1] + at, r->g[2] + at};
+        r->end[i] = at + r->state->tools.kernels->keep_gradients(
+                             &pairs, r->rows->neighbor + r->rows->start[i], r->rows->count[i],
+                             (uint32_t)i, r->neighbor + at, g);
         if (r->wall_rows->count[i])
-            (void)look(r, i, r->wall_rows, walls, r->wall_volume, scratch, wall);
+            (void)look(r, i, r->wall_rows, NULL, walls, r->wall_volume, scratch, wall);
         float square = sum[4];
         for (int c = 0; c < 3; c++) {
             r->own[c][i] = sum[1 + c] + wall[1 + c];
@@ -248,8 +246,8 @@ static bool lend_volumes(relaxation *r)
     return volume != NULL;
 }
 
-/* Everything that sweeps read. */
-static ascc_status open_relaxation(relaxation *r, ascc_step_state *state)
+/* Everything that sweeps read; repulsion: m. */
+static ascc_status open_relaxation(relaxation *r, ascc_step_state *state, double repulsion)
 {
     const ascc_network_run *run = &state->run;
     const ascc_search_tools *tools = &state->tools;
@@ -259,7 +257,8 @@ static ascc_status open_relaxation(relaxation *r, ascc_step_state *state)
                       .rows = &run->rows[state->network->relaxation_key[0]],
                       .wall_rows = &run->rows[state->network->relaxation_key[1]],
                       .count = state->hierarchy.set[ASCC_SET_FLUID].count,
-                      .inverse_support = (float)(state->hierarchy.scale.unit / constants->support)};
+                      .inverse_support = (float)(state->hierarchy.scale.unit / constants->support),
+                      .repulsion = (float)(repulsion / constants->support)};
     if (r->count > INT32_MAX)
         return ascc_fail(tools->message, ASCC_ERROR_RANGE, "more than 2^31 particles to relax");
     ascc_status status = ascc_wall_volumes_update(state->walls, tools, state->particles,
@@ -424,6 +423,25 @@ static double impulse_factor(const relaxation *r)
            state->particles->quantum;
 }
 
+/* Of a row without repulsion what was kept is all. */
+static bool evaluate_kept(ascc_pair_sum *sum, size_t i)
+{
+    const relaxation *r = sum->data;
+    if (r->near[i])
+        return false;
+    const ascc_gradients pairs = gradients(r);
+    const ascc_pressures pressures = {.pressure = r->pressure,
+                                      .limit = (float)(r->constants->limit / r->constants->support),
+                                      .factor = impulse_factor(r),
+                                      .mass = sum->mass,
+                                      .uniform = sum->uniform,
+                                      .place = r->place};
+    if (!r->state->tools.kernels->pressure_impulses(&pairs, &pressures, i, ASCC_IMPULSE_LIMIT,
+                                                    sum->sum))
+        ascc_pair_sum_note_bad(sum, i);
+    return true;
+}
+
 static void evaluate(ascc_pair_sum *sum, size_t i, ascc_pair_batch *b)
 {
     const relaxation *r = sum->data;
@@ -461,6 +479,7 @@ static ascc_status apply(relaxation *r, int64_t *given)
     const ascc_impulses to = {given, r->state->impulses.wall};
     uint64_t pairs;
     r->sum.data = r;
+    r->sum.whole = evaluate_kept;
     r->sum.skip_coincident = false; /* where the network saw them; now they may be apart */
     ascc_pair_sum_run(&r->sum, r->rows, evaluate);
     ascc_pair_sum_run_walls(&r->sum, r->wall_rows, r->state->impulses.wall, evaluate_walls);
@@ -572,12 +591,12 @@ static ascc_status relax(ascc_step_state *state, relaxation *r, int64_t *given)
 {
     const ascc_particles *p = state->particles;
     ascc_step_statistics *s = state->statistics;
-    ascc_status status = given ? open_relaxation(r, state) : no_memory(state);
+    const double repulsion = state->network->plan->relaxation.repulsion;
+    ascc_status status = given ? open_relaxation(r, state, repulsion) : no_memory(state);
     if (status == ASCC_OK && !find_lines(r))
         status = no_memory(state);
     if (status != ASCC_OK)
         return status;
-    r->repulsion = (float)(r->constants->repulsion / r->constants->support);
     if (r->constants->guess)
         r->guess = state->run.value[r->constants->guess].rectified;
     memset(r->change, 0, r->count * sizeof *r->change);
@@ -618,7 +637,7 @@ static void find_velocities(relaxation *r)
     for (size_t i = 0; i < r->count; i++) {
         const size_t row = ascc_hierarchy_host_row(h, ASCC_SET_FLUID, i);
         for (size_t c = 0; c < 3; c++)
-            r->move[c][i] =
+            r->move[i * 4 + c] =
                 c < d
                     ? (float)((double)r->state->advance.momentum[row * d + c] * unit / p->mass[row])
                     : 0.0f;
@@ -639,7 +658,7 @@ static void diverge_rows(void *data, size_t begin, size_t end, int32_t slot)
 static ascc_status slow_down(ascc_step_state *state, relaxation *r, int64_t *given)
 {
     const ascc_particles *p = state->particles;
-    ascc_status status = given ? open_relaxation(r, state) : no_memory(state);
+    ascc_status status = given ? open_relaxation(r, state, 0.0) : no_memory(state);
     if (status != ASCC_OK)
         return status;
     find_velocities(r);
