@@ -232,6 +232,41 @@ static void geometry_has_the_same_bits_on_every_cpu(void **state)
         }
 }
 
+static void directions_are_those_of_the_geometry_on_every_cpu(void **state)
+{
+    (void)state;
+    ascc_kernels table[16];
+    const int count = tables(table);
+    int32_t at[3][64], place[64 * 4];
+    for (size_t i = 0; i < 64 * 4; i++) {
+        place[i] = (int32_t)(next() << 1) / 64;
+        if (i % 4 < 3)
+            at[i % 4][i / 4] = place[i];
+    }
+    const ascc_coordinates points = {at[0], at[1], at[2]};
+    for (size_t k = 0; k < 40; k++) {
+        uint32_t neighbor[40];
+        const size_t room = (k + 7) / 8 * 8;
+        for (size_t i = 0; i < k; i++)
+            neighbor[i] = i == 2 ? 7 : next() % 64; /* 7: the row itself */
+        pair_arrays want = take_pairs(room);
+        const ascc_pairs a = as_pairs(&want);
+        table[0].geometry(&points, neighbor, k, place[28], place[29], place[30], 0x1p-25f, 3, &a);
+        for (int t = 0; t < count; t++) {
+            pair_arrays got = take_pairs(room);
+            const ascc_pairs b = as_pairs(&got);
+            table[t].directions(place, neighbor, k, place + 28, 0x1p-25f, &b);
+            check_same_bits(want.x, got.x, k, "x");
+            check_same_bits(want.y, got.y, k, "y");
+            check_same_bits(want.z, got.z, k, "z");
+            check_same_bits(want.distance, got.distance, k, "distance");
+            check_guard(got.distance, room);
+            drop_pairs(&got);
+        }
+        drop_pairs(&want);
+    }
+}
+
 static void geometry_of_opposite_displacements_is_opposite(void **state)
 {
     (void)state;
@@ -1149,6 +1184,7 @@ int main(void)
         cmocka_unit_test(search_cube_finds_the_points_within_on_every_cpu),
         cmocka_unit_test(search_sees_across_the_wrap_of_the_low_words),
         cmocka_unit_test(geometry_has_the_same_bits_on_every_cpu),
+        cmocka_unit_test(directions_are_those_of_the_geometry_on_every_cpu),
         cmocka_unit_test(geometry_of_opposite_displacements_is_opposite),
         cmocka_unit_test(the_volume_map_fills_the_cube_and_stays_inside),
         cmocka_unit_test(the_basis_equals_doubles_and_has_the_same_bits_on_every_cpu),

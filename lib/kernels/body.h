@@ -173,6 +173,31 @@ static void geometry(const ascc_coordinates *points, const uint32_t *RESTRICT ne
         map_radial(px, py, pz, k);
 }
 
+static void directions(const int32_t *place, const uint32_t *neighbor, size_t k,
+                       const int32_t at[3], float inverse_radius, const ascc_pairs *pairs)
+{
+    const vector inverse = fill(inverse_radius);
+    for (size_t i = 0; i < k; i += LANES) {
+        const size_t last = k - i < LANES ? k - i - 1 : LANES - 1;
+        const float *from[LANES]; /* integers, moved as they are */
+        vector v[4];
+        for (size_t l = 0; l < LANES; l++)
+            from[l] =
+                (const float *)(const void *)(place +
+                                              (size_t)neighbor[i + (l < last ? l : last)] * 4);
+        load_quads(from, v);
+        const vector x = times(more_than(v[0], at[0]), inverse);
+        const vector y = times(more_than(v[1], at[1]), inverse);
+        const vector z = times(more_than(v[2], at[2]), inverse);
+        const vector n = root(add(add(times(x, x), times(y, y)), times(z, z)));
+        const vector s = over(fill(1.0f), larger(n, fill(1e-30f))); /* 0 of 0 */
+        store(pairs->x + i, times(x, s));
+        store(pairs->y + i, times(y, s));
+        store(pairs->z + i, times(z, s));
+        store(pairs->distance + i, n);
+    }
+}
+
 /* Where eight neighbours lie among the cells: the lowest of the cells around each, and the weights of
  * all of them, window included. */
 typedef struct corners {
@@ -1169,6 +1194,7 @@ void ASCC_VARIANT(ascc_kernels *kernels)
     kernels->search = SEARCH;
     kernels->search_cube = SEARCH_CUBE;
     kernels->geometry = geometry;
+    kernels->directions = directions;
     kernels->gather = gather;
     kernels->basis = basis;
     kernels->gather_basis = gather_basis;

@@ -84,6 +84,11 @@ typedef struct ascc_kernels {
                      int32_t y, int32_t z, float inverse_radius, int mapping,
                      const ascc_pairs *pairs);
 
+    /* The same with mapping 3 of places [row][4], of which the first three count. Fills up to a multiple of 8
+     * pairs. */
+    void (*directions)(const int32_t *place, const uint32_t *neighbor, size_t k,
+                       const int32_t at[3], float inverse_radius, const ascc_pairs *pairs);
+
     /* column[c][a] = sum over k of window * trilinear weight * feature[neighbor[k]][a], neighbours in
      * order; window NULL = 1. cells: along x, y, z. column is overwritten. */
     void (*gather)(const ascc_pairs *pairs, const float *window, const uint32_t *neighbor, size_t k,

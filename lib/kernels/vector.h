@@ -79,6 +79,22 @@ static inline vector smaller(vector a, vector b)
     return _mm256_min_ps(a, b);
 }
 
+static inline vector over(vector a, vector b)
+{
+    return _mm256_div_ps(a, b);
+}
+
+static inline vector root(vector a)
+{
+    return _mm256_sqrt_ps(a);
+}
+
+/* Of lanes that hold integers: how much they are more than one, modulo 2^32, as floats. */
+static inline vector more_than(vector a, int32_t b)
+{
+    return _mm256_cvtepi32_ps(_mm256_sub_epi32(_mm256_castps_si256(a), _mm256_set1_epi32(b)));
+}
+
 /* The whole part of 0 <= a < 2^24, and that as integers. */
 static inline vector whole(vector a)
 {
@@ -203,6 +219,23 @@ static inline vector smaller(vector a, vector b)
                     vbslq_f32(vcltq_f32(a.high, b.high), a.high, b.high)};
 }
 
+static inline vector over(vector a, vector b)
+{
+    return (vector){vdivq_f32(a.low, b.low), vdivq_f32(a.high, b.high)};
+}
+
+static inline vector root(vector a)
+{
+    return (vector){vsqrtq_f32(a.low), vsqrtq_f32(a.high)};
+}
+
+static inline vector more_than(vector a, int32_t b)
+{
+    const int32x4_t from = vdupq_n_s32(b);
+    return (vector){vcvtq_f32_s32(vsubq_s32(vreinterpretq_s32_f32(a.low), from)),
+                    vcvtq_f32_s32(vsubq_s32(vreinterpretq_s32_f32(a.high), from))};
+}
+
 static inline vector whole(vector a)
 {
     return (vector){vrndq_f32(a.low), vrndq_f32(a.high)};
@@ -283,6 +316,29 @@ static inline vector smaller(vector a, vector b)
 {
     for (int i = 0; i < LANES; i++)
         a.lane[i] = a.lane[i] < b.lane[i] ? a.lane[i] : b.lane[i];
+    return a;
+}
+
+static inline vector over(vector a, vector b)
+{
+    for (int i = 0; i < LANES; i++)
+        a.lane[i] /= b.lane[i];
+    return a;
+}
+
+static inline vector root(vector a)
+{
+    for (int i = 0; i < LANES; i++)
+        a.lane[i] = sqrtf(a.lane[i]);
+    return a;
+}
+
+static inline vector more_than(vector a, int32_t b)
+{
+    uint32_t bits[LANES];
+    memcpy(bits, a.lane, sizeof bits);
+    for (int i = 0; i < LANES; i++)
+        a.lane[i] = (float)(int32_t)(bits[i] - (uint32_t)b);
     return a;
 }
 
@@ -412,7 +468,7 @@ static inline void transpose_lanes(vector a[LANES])
 #endif
 }
 
-/* Four floats from each of eight places become four vectors of eight. */
+/* Four floats, or integers, from each of eight places become four vectors of eight. */
 static inline void load_quads(const float *const from[LANES], vector to[4])
 {
 #if defined(ASCC_USE_AVX2)
@@ -430,7 +486,7 @@ static inline void load_quads(const float *const from[LANES], vector to[4])
     for (int c = 0; c < 4; c++) {
         float lane[LANES];
         for (int i = 0; i < LANES; i++)
-            lane[i] = from[i][c];
+            memcpy(&lane[i], from[i] + c, sizeof lane[i]);
         to[c] = load(lane);
     }
 #endif
