@@ -58,19 +58,24 @@ static size_t columns(const ascc_tile *tile, const ascc_term *term)
     return count;
 }
 
+static bool all_zero(const float from[8])
+{
+    uint64_t bits[4];
+    memcpy(bits, from, sizeof bits);
+    return !(bits[0] | bits[1] | bits[2] | bits[3]);
+}
+
 /* Inputs up to the last that is not 0 in all n rows: away from walls half of all moments are. */
 static size_t used_inputs(const float *in, size_t stride, size_t n, size_t a)
 {
-    for (; a > 8; a -= 8)
-        for (size_t r = 0; r < n; r++) {
-            const float *last = in + r * stride + a - 8;
-            int used = 0;
-            for (size_t c = 0; c < 8; c++)
-                used |= last[c] != 0.0f;
-            if (used)
-                return a;
-        }
-    return a;
+    size_t used = 8;
+    for (size_t r = 0; r < n && used < a; r++) {
+        size_t end = a;
+        while (end > used && all_zero(in + r * stride + end - 8))
+            end -= 8;
+        used = end;
+    }
+    return used;
 }
 
 /* n rows of the tile from r on, whose inputs follow one another. */

@@ -152,31 +152,29 @@ static void sum_row(const ascc_tile *tile, const ascc_term *term, int list, size
                                  areas_of(run, list), stride, (size_t)filter.bumps, sum);
 }
 
-/* The numbers of bumps, in a plane without those that it does not have. Returns where they end. */
-static float *add_bumps(const float *restrict from, int32_t bumps, int32_t dimension,
-                        float *restrict to)
+/* The numbers of bumps, in a plane without those that it does not have. */
+static void add_bumps(const float *restrict from, int32_t bumps, int32_t dimension,
+                      float *restrict to)
 {
-    if (dimension == 3) {
-        for (int32_t n = 0; n < 8 * bumps; n++)
-            to[n] += from[n];
-        return to + 8 * bumps;
-    }
-    for (int32_t n = 0; n < 8 * bumps; n++)
+    for (int32_t n = 0; dimension == 3 && n < 8 * bumps; n++)
+        to[n] += from[n];
+    for (int32_t n = 0; dimension < 3 && n < 8 * bumps; n++)
         if (n % 8 != 3 && n % 8 != 7)
             *to++ += from[n];
-    return to;
 }
 
 static void forward(const ascc_tile *tile, const ascc_term *term)
 {
-    const int32_t dimension = tile->run->plan->dimension;
+    const ascc_plan *plan = tile->run->plan;
     for (size_t r = 0; r < tile->n; r++) {
-        float *to = tile->sum + r * tile->width + term->column;
+        float *to = tile->sum + r * tile->width + term->column, sum[ASCC_MAX_BUMPS * 8];
         for (int list = 0; list < (wall_bumps(term) ? 2 : 1); list++) {
-            float sum[ASCC_MAX_BUMPS * 8];
             const int32_t bumps = list ? wall_bumps(term) : term->filter.bumps;
-            sum_row(tile, term, list, tile->list[r], sum);
-            to = add_bumps(sum, bumps, dimension, to);
+            if (ascc_term_list(tile->run, term, list)->count[tile->list[r]]) { /* mostly no walls */
+                sum_row(tile, term, list, tile->list[r], sum);
+                add_bumps(sum, bumps, plan->dimension, to);
+            }
+            to += bumps * numbers(plan);
         }
     }
 }
