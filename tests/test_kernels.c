@@ -97,7 +97,8 @@ static void search_finds_the_points_within_the_limit_on_every_cpu(void **state)
         for (int t = 0; t < count; t++) {
             uint32_t found[100];
             const size_t begin = n / 5;
-            const size_t got = table[t].search(&points, begin, n, q[0], q[1], q[2], limit, found);
+            const ascc_run runs[2] = {{begin, n / 2}, {n / 2, n}};
+            const size_t got = table[t].search(&points, runs, 2, q[0], q[1], q[2], limit, found);
             size_t k = 0;
             for (size_t i = begin; i < n; i++) {
                 const double dx = (double)x[i] - q[0], dy = (double)y[i] - q[1],
@@ -135,7 +136,8 @@ static void search_cube_finds_the_points_within_on_every_cpu(void **state)
         const ascc_coordinates points = {x, y, z};
         for (int t = 0; t < count; t++) {
             uint32_t found[100];
-            const size_t got = table[t].search_cube(&points, n / 5, n, 0, 0, 0, inverse, found);
+            const ascc_run runs[2] = {{n / 5, n / 3}, {n / 3, n}};
+            const size_t got = table[t].search_cube(&points, runs, 2, 0, 0, 0, inverse, found);
             size_t k = 0;
             for (size_t i = n / 5; i < n; i++)
                 if (abs(x[i]) < 6999999 && abs(y[i]) < 6999999 && abs(z[i]) < 6999999)
@@ -154,10 +156,11 @@ static void search_sees_across_the_wrap_of_the_low_words(void **state)
     const ascc_coordinates points = {x, zero, zero};
     for (int t = 0; t < count; t++) {
         uint32_t found[20];
-        assert_int_equal(table[t].search(&points, 0, 1, INT32_MAX - 10, 0, 0, 21.5f * 21.5f, found),
-                         1);
-        assert_int_equal(table[t].search(&points, 0, 1, INT32_MAX - 10, 0, 0, 20.5f * 20.5f, found),
-                         0);
+        const ascc_run all = {0, 1};
+        assert_int_equal(
+            table[t].search(&points, &all, 1, INT32_MAX - 10, 0, 0, 21.5f * 21.5f, found), 1);
+        assert_int_equal(
+            table[t].search(&points, &all, 1, INT32_MAX - 10, 0, 0, 20.5f * 20.5f, found), 0);
     }
 }
 

@@ -11,7 +11,7 @@
 #include "kernels.h"
 
 /* The loops of search() and, with cube, search_cube() in body.h, same operations in the same order. */
-static inline size_t search_lanes(const ascc_coordinates *points, size_t begin, size_t end,
+static inline size_t search_lanes(const ascc_coordinates *points, const ascc_run *runs, size_t n,
                                   int32_t x, int32_t y, int32_t z, float limit, int cube,
                                   uint32_t *restrict found)
 {
@@ -19,46 +19,48 @@ static inline size_t search_lanes(const ascc_coordinates *points, size_t begin, 
     const __m512 limits = _mm512_set1_ps(limit), one = _mm512_set1_ps(1.0f);
     const __m512i steps = _mm512_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
     size_t count = 0;
-    for (size_t i = begin; i < end; i += 16) {
-        const size_t left = end - i;
-        const __mmask16 valid = (__mmask16)(left < 16 ? (1u << left) - 1u : 0xffffu);
-        const __m512 dx = _mm512_cvtepi32_ps(
-            _mm512_sub_epi32(_mm512_maskz_loadu_epi32(valid, points->x + i), qx));
-        const __m512 dy = _mm512_cvtepi32_ps(
-            _mm512_sub_epi32(_mm512_maskz_loadu_epi32(valid, points->y + i), qy));
-        const __m512 dz = _mm512_cvtepi32_ps(
-            _mm512_sub_epi32(_mm512_maskz_loadu_epi32(valid, points->z + i), qz));
-        __mmask16 near;
-        if (cube) {
-            const __m512 ax = _mm512_abs_ps(_mm512_mul_ps(dx, limits));
-            const __m512 ay = _mm512_abs_ps(_mm512_mul_ps(dy, limits));
-            const __m512 az = _mm512_abs_ps(_mm512_mul_ps(dz, limits));
-            near = _mm512_mask_cmp_ps_mask(valid, _mm512_max_ps(_mm512_max_ps(ax, ay), az), one,
-                                           _CMP_LT_OQ);
-        } else {
-            const __m512 square = _mm512_add_ps(
-                _mm512_add_ps(_mm512_mul_ps(dx, dx), _mm512_mul_ps(dy, dy)), _mm512_mul_ps(dz, dz));
-            near = _mm512_mask_cmp_ps_mask(valid, square, limits, _CMP_LE_OQ);
+    for (size_t r = 0; r < n; r++)
+        for (size_t i = runs[r].begin; i < runs[r].end; i += 16) {
+            const size_t left = runs[r].end - i;
+            const __mmask16 valid = (__mmask16)(left < 16 ? (1u << left) - 1u : 0xffffu);
+            const __m512 dx = _mm512_cvtepi32_ps(
+                _mm512_sub_epi32(_mm512_maskz_loadu_epi32(valid, points->x + i), qx));
+            const __m512 dy = _mm512_cvtepi32_ps(
+                _mm512_sub_epi32(_mm512_maskz_loadu_epi32(valid, points->y + i), qy));
+            const __m512 dz = _mm512_cvtepi32_ps(
+                _mm512_sub_epi32(_mm512_maskz_loadu_epi32(valid, points->z + i), qz));
+            __mmask16 near;
+            if (cube) {
+                const __m512 ax = _mm512_abs_ps(_mm512_mul_ps(dx, limits));
+                const __m512 ay = _mm512_abs_ps(_mm512_mul_ps(dy, limits));
+                const __m512 az = _mm512_abs_ps(_mm512_mul_ps(dz, limits));
+                near = _mm512_mask_cmp_ps_mask(valid, _mm512_max_ps(_mm512_max_ps(ax, ay), az), one,
+                                               _CMP_LT_OQ);
+            } else {
+                const __m512 square =
+                    _mm512_add_ps(_mm512_add_ps(_mm512_mul_ps(dx, dx), _mm512_mul_ps(dy, dy)),
+                                  _mm512_mul_ps(dz, dz));
+                near = _mm512_mask_cmp_ps_mask(valid, square, limits, _CMP_LE_OQ);
+            }
+            const __m512i rows = _mm512_add_epi32(_mm512_set1_epi32((int)(uint32_t)i), steps);
+            /* Compressed in a register: found has room for a whole one, and that store is the fast one. */
+            _mm512_storeu_si512(found + count, _mm512_maskz_compress_epi32(near, rows));
+            count += (size_t)_mm_popcnt_u32(near);
         }
-        const __m512i rows = _mm512_add_epi32(_mm512_set1_epi32((int)(uint32_t)i), steps);
-        /* Compressed in a register: found has room for a whole one, and that store is the fast one. */
-        _mm512_storeu_si512(found + count, _mm512_maskz_compress_epi32(near, rows));
-        count += (size_t)_mm_popcnt_u32(near);
-    }
     return count;
 }
 
-static size_t search_avx512(const ascc_coordinates *points, size_t begin, size_t end, int32_t x,
-                            int32_t y, int32_t z, float limit, uint32_t *restrict found)
+static size_t search_avx512(const ascc_coordinates *points, const ascc_run *runs, size_t n,
+                            int32_t x, int32_t y, int32_t z, float limit, uint32_t *restrict found)
 {
-    return search_lanes(points, begin, end, x, y, z, limit, 0, found);
+    return search_lanes(points, runs, n, x, y, z, limit, 0, found);
 }
 
-static size_t search_cube_avx512(const ascc_coordinates *points, size_t begin, size_t end,
+static size_t search_cube_avx512(const ascc_coordinates *points, const ascc_run *runs, size_t n,
                                  int32_t x, int32_t y, int32_t z, float inverse,
                                  uint32_t *restrict found)
 {
-    return search_lanes(points, begin, end, x, y, z, inverse, 1, found);
+    return search_lanes(points, runs, n, x, y, z, inverse, 1, found);
 }
 
 /* TILE of body.h with registers of sixteen floats: out[rows][vectors * 16] += in * weight. */

@@ -19,38 +19,40 @@
 /* A variant may bring searches of its own. */
 #ifndef SEARCH
 #define SEARCH search
-static size_t search(const ascc_coordinates *points, size_t begin, size_t end, int32_t x, int32_t y,
-                     int32_t z, float limit, uint32_t *RESTRICT found)
+static size_t search(const ascc_coordinates *points, const ascc_run *runs, size_t count, int32_t x,
+                     int32_t y, int32_t z, float limit, uint32_t *RESTRICT found)
 {
-    size_t count = 0;
+    size_t n = 0;
     const uint32_t ux = (uint32_t)x, uy = (uint32_t)y, uz = (uint32_t)z;
-    for (size_t i = begin; i < end; i++) {
-        const float dx = (float)(int32_t)((uint32_t)points->x[i] - ux);
-        const float dy = (float)(int32_t)((uint32_t)points->y[i] - uy);
-        const float dz = (float)(int32_t)((uint32_t)points->z[i] - uz);
-        found[count] = (uint32_t)i;
-        count += dx * dx + dy * dy + dz * dz <= limit;
-    }
-    return count;
+    for (size_t r = 0; r < count; r++)
+        for (size_t i = runs[r].begin; i < runs[r].end; i++) {
+            const float dx = (float)(int32_t)((uint32_t)points->x[i] - ux);
+            const float dy = (float)(int32_t)((uint32_t)points->y[i] - uy);
+            const float dz = (float)(int32_t)((uint32_t)points->z[i] - uz);
+            found[n] = (uint32_t)i;
+            n += dx * dx + dy * dy + dz * dz <= limit;
+        }
+    return n;
 }
 #endif
 
 #ifndef SEARCH_CUBE
 #define SEARCH_CUBE search_cube
-static size_t search_cube(const ascc_coordinates *points, size_t begin, size_t end, int32_t x,
-                          int32_t y, int32_t z, float inverse, uint32_t *RESTRICT found)
+static size_t search_cube(const ascc_coordinates *points, const ascc_run *runs, size_t count,
+                          int32_t x, int32_t y, int32_t z, float inverse, uint32_t *RESTRICT found)
 {
-    size_t count = 0;
+    size_t n = 0;
     const uint32_t ux = (uint32_t)x, uy = (uint32_t)y, uz = (uint32_t)z;
-    for (size_t i = begin; i < end; i++) {
-        const float dx = fabsf((float)(int32_t)((uint32_t)points->x[i] - ux) * inverse);
-        const float dy = fabsf((float)(int32_t)((uint32_t)points->y[i] - uy) * inverse);
-        const float dz = fabsf((float)(int32_t)((uint32_t)points->z[i] - uz) * inverse);
-        const float xy = dx > dy ? dx : dy;
-        found[count] = (uint32_t)i;
-        count += (xy > dz ? xy : dz) < 1.0f;
-    }
-    return count;
+    for (size_t r = 0; r < count; r++)
+        for (size_t i = runs[r].begin; i < runs[r].end; i++) {
+            const float dx = fabsf((float)(int32_t)((uint32_t)points->x[i] - ux) * inverse);
+            const float dy = fabsf((float)(int32_t)((uint32_t)points->y[i] - uy) * inverse);
+            const float dz = fabsf((float)(int32_t)((uint32_t)points->z[i] - uz) * inverse);
+            const float xy = dx > dy ? dx : dy;
+            found[n] = (uint32_t)i;
+            n += (xy > dz ? xy : dz) < 1.0f;
+        }
+    return n;
 }
 #endif
 

@@ -17,6 +17,11 @@ typedef struct ascc_coordinates {
     const int32_t *x, *y, *z;
 } ascc_coordinates;
 
+/* Points [begin, end). */
+typedef struct ascc_run {
+    size_t begin, end;
+} ascc_run;
+
 /* Geometry of neighbour pairs, one entry a pair: where the neighbour lies in the kernel's cube
  * [-1, 1]^3, and the value of each window there (by ascc_window; NULL = not wanted). Every array can
  * be read to the next multiple of 8 pairs; what lies there does not matter. */
@@ -68,15 +73,15 @@ typedef struct ascc_lines {
 } ascc_lines;
 
 typedef struct ascc_kernels {
-    /* Appends to found[] those of points [begin, end) whose squared distance from (x, y, z) is at
-     * most limit (in squared units of the integers); ascending. Returns how many. found has room
-     * for end - begin + 16. */
-    size_t (*search)(const ascc_coordinates *points, size_t begin, size_t end, int32_t x, int32_t y,
-                     int32_t z, float limit, uint32_t *found);
+    /* Writes to found[] those points of some runs whose squared distance from (x, y, z) is at most limit (in
+     * squared units of the integers); in order. Returns how many. found has room for all points of the runs
+     * + 16. */
+    size_t (*search)(const ascc_coordinates *points, const ascc_run *runs, size_t count, int32_t x,
+                     int32_t y, int32_t z, float limit, uint32_t *found);
 
     /* The same of those within a cube: all of |x|, |y|, |z| times inverse below 1, the hat above 0. */
-    size_t (*search_cube)(const ascc_coordinates *points, size_t begin, size_t end, int32_t x,
-                          int32_t y, int32_t z, float inverse, uint32_t *found);
+    size_t (*search_cube)(const ascc_coordinates *points, const ascc_run *runs, size_t count,
+                          int32_t x, int32_t y, int32_t z, float inverse, uint32_t *found);
 
     /* pairs[k] of the displacements neighbour[k] - (x, y, z), scaled by inverse_radius into the unit
      * ball and mapped to the cube (or to directions). mapping is an ascc_mapping. */
