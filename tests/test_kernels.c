@@ -542,7 +542,7 @@ static void moments_equal_doubles_and_have_the_same_bits_on_every_cpu(void **sta
 #define LINE_RADIUS 50000000
 
 typedef struct lines_case {
-    int32_t at[3][LINE_ROWS];
+    int32_t at[LINE_ROWS * 4];
     float coefficient[(LINE_ROWS + 1) * 16], motion[(LINE_ROWS + 1) * 8];
     double place[LINE_ROWS * 3], mass[ASCC_PAIR_BATCH];
     uint32_t neighbor[ASCC_PAIR_BATCH];
@@ -554,8 +554,9 @@ static void random_lines(lines_case *c, size_t bumps, unsigned options)
 {
     const size_t d = options & 8 ? 2 : 3;
     for (size_t i = 0; i < LINE_ROWS * 3; i++) {
-        c->at[i % 3][i / 3] = i % 3 < d ? (int32_t)(uniform() * LINE_RADIUS / 4) : 0;
-        c->place[i] = c->at[i % 3][i / 3] + 1e6 * (double)uniform() * (i % 3 < d);
+        const size_t at = i / 3 * 4 + i % 3;
+        c->at[at] = i % 3 < d ? (int32_t)(uniform() * LINE_RADIUS / 4) : 0;
+        c->place[i] = c->at[at] + 1e6 * (double)uniform() * (i % 3 < d);
     }
     for (size_t i = 0; i < sizeof c->coefficient / sizeof *c->coefficient; i++) /* [row][bump][2] */
         c->coefficient[i] = i % 16 / 2 < bumps && (i % 2 == 0 || options & 2) ? uniform() : 0.0f;
@@ -566,11 +567,11 @@ static void random_lines(lines_case *c, size_t bumps, unsigned options)
         c->mass[k] = 1.5 + (double)uniform();
     }
     for (int i = 0; i < 3; i++) { /* neighbour 1 lies where row 0 does; all others differ */
-        c->at[i][1] = c->at[i][0];
+        c->at[4 + i] = c->at[i];
         c->place[3 + i] = c->place[i];
     }
-    c->lines = (ascc_lines){.row = {c->at[0], c->at[1], c->at[2]},
-                            .neighbor = {c->at[0], c->at[1], c->at[2]},
+    c->lines = (ascc_lines){.row = c->at,
+                            .neighbor = c->at,
                             .inverse_radius = 1.0f / LINE_RADIUS,
                             .bumps = bumps,
                             .dimension = d,
@@ -592,7 +593,7 @@ static void impulse_of(const lines_case *c, size_t j, double mass, double impuls
     double seen[3], line[3], u[3], distance = 0.0, length = 0.0, cosine = 0.0, approach = 0.0;
     double part[2] = {0.0, 0.0};
     for (size_t i = 0; i < 3; i++) {
-        seen[i] = (double)c->at[i][j] - (double)c->at[i][0];
+        seen[i] = (double)c->at[j * 4 + i] - (double)c->at[i];
         line[i] = l->place ? c->place[j * 3 + i] - c->place[i] : seen[i];
         distance += seen[i] * seen[i];
         length += line[i] * line[i];

@@ -175,13 +175,19 @@ static void geometry(const ascc_coordinates *points, const uint32_t *RESTRICT ne
         map_radial(px, py, pz, k);
 }
 
+/* Integers to load as vectors, moved as they are. */
+static inline const float *integers(const int32_t *p)
+{
+    return (const float *)(const void *)p;
+}
+
 static void directions(const int32_t *place, const uint32_t *neighbor, size_t k,
                        const int32_t at[3], float inverse_radius, const ascc_pairs *pairs)
 {
     const vector inverse = fill(inverse_radius);
     for (size_t i = 0; i < k; i += LANES) {
         const size_t last = k - i < LANES ? k - i - 1 : LANES - 1;
-        const float *from[LANES]; /* integers, moved as they are */
+        const float *from[LANES];
         vector v[4];
         for (size_t l = 0; l < LANES; l++)
             from[l] =
@@ -670,15 +676,15 @@ static void find_displacements(const ascc_lines *l, size_t row, const uint32_t *
                                size_t n, double d[3][ASCC_PAIR_BATCH], float *RESTRICT rho)
 {
     int32_t at[3][ASCC_PAIR_BATCH];
-    const int32_t *RESTRICT x = l->neighbor.x, *RESTRICT y = l->neighbor.y;
-    const int32_t *RESTRICT z = l->neighbor.z;
-    const uint32_t ux = (uint32_t)l->row.x[row], uy = (uint32_t)l->row.y[row];
-    const uint32_t uz = (uint32_t)l->row.z[row];
     const float inverse = l->inverse_radius;
-    for (size_t i = 0; i < n; i++) {
-        at[0][i] = (int32_t)((uint32_t)x[neighbor[i]] - ux);
-        at[1][i] = (int32_t)((uint32_t)y[neighbor[i]] - uy);
-        at[2][i] = (int32_t)((uint32_t)z[neighbor[i]] - uz);
+    for (size_t i = 0; i < n; i += LANES) {
+        const float *from[LANES];
+        vector v[4];
+        for (size_t j = 0; j < LANES; j++)
+            from[j] = integers(l->neighbor + (size_t)neighbor[i + j] * 4);
+        load_quads(from, v);
+        for (size_t c = 0; c < 3; c++)
+            store_more(at[c] + i, v[c], l->row[row * 4 + c]);
     }
     for (size_t i = 0; i < n; i++) {
         const float dx = (float)at[0][i] * inverse;

@@ -56,7 +56,7 @@ typedef struct ascc_pressures {
 /* Rows whose pairs act along the lines to their neighbours: all but the rows' own coefficients. Those are of
  * each bump strength and damping in turn, 16 numbers, zeros where there are fewer. */
 typedef struct ascc_lines {
-    ascc_coordinates row, neighbor; /* as the network sees them */
+    const int32_t *row, *neighbor; /* places as the network sees them, [row][4] */
     float inverse_radius;
     size_t bumps, dimension;
     int both; /* neighbours are rows of the same set; else they rest, and have no coefficients */

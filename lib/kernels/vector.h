@@ -89,7 +89,13 @@ static inline vector root(vector a)
     return _mm256_sqrt_ps(a);
 }
 
-/* Of lanes that hold integers: how much they are more than one, modulo 2^32, as floats. */
+/* Of lanes that hold integers: how much they are more than one, modulo 2^32, as integers, as floats. */
+static inline void store_more(int32_t *p, vector a, int32_t b)
+{
+    _mm256_storeu_si256((__m256i *)p,
+                        _mm256_sub_epi32(_mm256_castps_si256(a), _mm256_set1_epi32(b)));
+}
+
 static inline vector more_than(vector a, int32_t b)
 {
     return _mm256_cvtepi32_ps(_mm256_sub_epi32(_mm256_castps_si256(a), _mm256_set1_epi32(b)));
@@ -358,6 +364,16 @@ static inline void store_whole(int32_t *p, vector a)
 #endif
 
 #if !defined(ASCC_USE_AVX2)
+static inline void store_more(int32_t *p, vector a, int32_t b)
+{
+    float lane[LANES];
+    uint32_t bits[LANES];
+    store(lane, a);
+    memcpy(bits, lane, sizeof bits);
+    for (int i = 0; i < LANES; i++)
+        p[i] = (int32_t)(bits[i] - (uint32_t)b);
+}
+
 static inline vector gather_lanes(const float *p, const uint32_t *index)
 {
     float lane[LANES];

@@ -146,9 +146,15 @@ static void sum_row(const ascc_tile *tile, const ascc_term *term, int list, size
     const float *vectors = vectors_of(run, list, &stride);
     const float *motion = vectors_of(run, 0, &own_stride) + row * own_stride;
     const float own[3] = {motion[0], motion[1], d > 2 ? motion[2] : 0.0f};
-    ascc_geometry g;
-    ascc_geometry_of(&g, run, rows, &filter, row, neighbor, count, tile->scratch, tile->room);
-    run->tools->kernels->moments(&g.pairs, neighbor, count, vectors, stride, own, list, d,
+    float *scratch = tile->scratch;
+    const ascc_pairs pairs = {.x = scratch,
+                              .y = scratch + tile->room,
+                              .z = scratch + 2 * tile->room,
+                              .distance = scratch + 3 * tile->room};
+    run->tools->kernels->directions(run->hierarchy->place[list], neighbor, count,
+                                    run->hierarchy->place[0] + row * 4, (float)(1.0 / rows->radius),
+                                    &pairs);
+    run->tools->kernels->moments(&pairs, neighbor, count, vectors, stride, own, list, d,
                                  areas_of(run, list), stride, (size_t)filter.bumps, sum);
 }
 

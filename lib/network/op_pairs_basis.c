@@ -201,6 +201,7 @@ static void scratch(const ascc_plan *plan, const ascc_term *term, ascc_scratch_s
 typedef struct coefficients {
     const ascc_network_run *run;
     const ascc_impulse_scale *scale;
+    const int32_t *seen; /* [set rows][4] where the network sees them */
     float *side[SIDES];  /* [set rows][WIDTH], NULL = not kept */
     const double *place; /* [set rows][3] positions that directions come from, else NULL */
 } coefficients;
@@ -273,12 +274,20 @@ static bool find_places(coefficients *c, const ascc_pair_sum *sum)
     return place != NULL;
 }
 
-/* ---- Pairs ---- */
-
-static ascc_coordinates coordinates_of(const ascc_points *points)
+/* Where the network sees the rows of the set; NULL without memory. */
+static const int32_t *find_seen(const ascc_network_run *run, int32_t set)
 {
-    return (ascc_coordinates){points->low[0], points->low[1], points->low[2]};
+    const ascc_points *points = &run->hierarchy->set[set];
+    if (set <= ASCC_SET_BOUNDARY)
+        return run->hierarchy->place[set];
+    int32_t *seen = ascc_arena_lend(run->tools->arena, points->count, 4 * sizeof *seen);
+    for (size_t i = 0; seen && i < points->count; i++)
+        for (size_t c = 0; c < 4; c++)
+            seen[i * 4 + c] = c < 3 ? points->low[c][i] : 0;
+    return seen;
 }
+
+/* ---- Pairs ---- */
 
 /* Areas of walls, so far apart, in the order of their set; NULL: each counts once. */
 static const float *areas_of(const ascc_network_run *run, size_t *stride)
@@ -294,8 +303,9 @@ static ascc_lines lines_of(const coefficients *c, int side)
     const ascc_plan *plan = c->run->plan;
     const ascc_term *term = &plan->output.term;
     const ascc_rows *rows = ascc_term_list(c->run, term, side);
-    ascc_lines l = {.row = coordinates_of(rows->query),
-                    .neighbor = coordinates_of(rows->source),
+    ascc_lines l = {.row = c->seen,
+                    .neighbor =
+                        side == FLUID ? c->seen : c->run->hierarchy->place[ASCC_SET_BOUNDARY],
                     .inverse_radius = (float)(1.0 / rows->radius),
                     .bumps = (size_t)filter_of(&plan->output, 2 * side)->bumps,
                     .dimension = (size_t)plan->dimension,
@@ -350,7 +360,8 @@ static ascc_status impulses(const ascc_network_run *run, const ascc_impulse_scal
         ascc_pair_sum_open(&sum, run, ascc_network_set(run->network, term->source), scale->mass, 4);
     if (status != ASCC_OK)
         return status;
-    if (!find_coefficients(&c, run, WALLS, run->tools->arena, ascc_arena_lend) ||
+    c.seen = find_seen(run, sum.set);
+    if (!c.seen || !find_coefficients(&c, run, WALLS, run->tools->arena, ascc_arena_lend) ||
         (output->current_direction && !find_places(&c, &sum)))
         return ascc_fail(run->tools->message, ASCC_ERROR_MEMORY, "no memory for the impulses");
     ascc_lines lines = lines_of(&c, FLUID);

@@ -166,7 +166,7 @@ size_t ascc_estimate_scratch(const ascc_network *network, size_t fluid, size_t b
 {
     const ascc_plan *plan = network->plan;
     const double f = (double)fluid, b = (double)boundary, all = f + b, d = plan->dimension;
-    double points = 8.0 * d * (5.0 * f + b) + all * (2.0 * POINT_BYTES + 12.0);
+    double points = 8.0 * d * (5.0 * f + b) + all * (2.0 * POINT_BYTES + 28.0);
     for (int32_t l = 1; l < plan->level_count; l++)
         points += POINT_BYTES * set_points(plan, ASCC_SET_LEVEL + l - 1, f, b);
     double longest = 0.0;
