@@ -734,6 +734,44 @@ static void gather_equals_doubles_and_has_the_same_bits_on_every_cpu(void **stat
             }
 }
 
+/* The same as of columns that hold the blocks one after another. */
+static void blocks_are_multiplied_as_columns_on_every_cpu(void **state)
+{
+    (void)state;
+    enum { MOST_ROWS = 19, MOST_BLOCKS = 27, PLACES = 40 };
+    static const size_t blocks[] = {0, 1, 9, MOST_BLOCKS}, inputs[] = {1, 8, 11, 16};
+    ascc_kernels table[16];
+    const int count = tables(table);
+    for (size_t n = 0; n <= MOST_ROWS; n++)
+        for (size_t b = 8; b <= 56; b += 8)
+            for (size_t i = 0; i < 16; i++) {
+                const size_t m = blocks[i / 4], a = inputs[i % 4], stride = b + 5;
+                float *source = floats(PLACES * 16), *weight = floats(m * a * b + 1);
+                float *column = floats(n * m * a + 1), *begin = floats(n * stride + 8);
+                float *want = guarded(n * stride);
+                const float *in[MOST_ROWS * MOST_BLOCKS];
+                for (size_t k = 0; k < n * m; k++) {
+                    in[k] = source + next() % PLACES * 16;
+                    memcpy(column + k * a, in[k], a * sizeof *column);
+                }
+                memcpy(want, begin, n * stride * sizeof *want);
+                table[0].multiply(column, m * a, n, m * a, weight, b, want, stride);
+                for (int t = 0; t < count; t++) {
+                    float *got = guarded(n * stride);
+                    memcpy(got, begin, n * stride * sizeof *got);
+                    table[t].multiply_blocks(in, m, n, a, weight, b, got, stride);
+                    check_same_bits(want, got, n * stride, "blocks");
+                    check_guard(got, n * stride);
+                    free(got);
+                }
+                free(source);
+                free(weight);
+                free(column);
+                free(begin);
+                free(want);
+            }
+}
+
 static void multiply_equals_doubles_and_has_the_same_bits_on_every_cpu(void **state)
 {
     (void)state;
@@ -1196,6 +1234,7 @@ int main(void)
         cmocka_unit_test(moments_equal_doubles_and_have_the_same_bits_on_every_cpu),
         cmocka_unit_test(pair_lines_equal_doubles_and_have_the_same_bits_on_every_cpu),
         cmocka_unit_test(gather_equals_doubles_and_has_the_same_bits_on_every_cpu),
+        cmocka_unit_test(blocks_are_multiplied_as_columns_on_every_cpu),
         cmocka_unit_test(multiply_equals_doubles_and_has_the_same_bits_on_every_cpu),
         cmocka_unit_test(pair_terms_equal_doubles_and_have_the_same_bits_on_every_cpu),
         cmocka_unit_test(pair_impulses_are_the_nearest_integers_on_every_cpu),

@@ -119,9 +119,67 @@ static size_t multiply_wide(const float *in, size_t in_stride, size_t n, size_t 
     return c;
 }
 
+/* BLOCKS of body.h likewise. */
+#define WIDE_BLOCKS(name, rows, vectors)                                                           \
+    static void name(const float *const *in, size_t blocks, size_t a,                              \
+                     const float *restrict weight, size_t b, float *restrict out,                  \
+                     size_t out_stride)                                                            \
+    {                                                                                              \
+        __m512 sum[rows][vectors];                                                                 \
+        for (size_t r = 0; r < rows; r++)                                                          \
+            for (size_t c = 0; c < vectors; c++)                                                   \
+                sum[r][c] = _mm512_loadu_ps(out + r * out_stride + c * 16);                        \
+        for (size_t k = 0; k < blocks; k++) {                                                      \
+            const float *from[rows];                                                               \
+            for (size_t r = 0; r < rows; r++)                                                      \
+                from[r] = in[r * blocks + k];                                                      \
+            for (size_t i = 0; i < a; i++, weight += b) {                                          \
+                __m512 w[vectors];                                                                 \
+                for (size_t c = 0; c < vectors; c++)                                               \
+                    w[c] = _mm512_loadu_ps(weight + c * 16);                                       \
+                for (size_t r = 0; r < rows; r++) {                                                \
+                    const __m512 value = _mm512_set1_ps(from[r][i]);                               \
+                    for (size_t c = 0; c < vectors; c++)                                           \
+                        sum[r][c] = _mm512_fmadd_ps(value, w[c], sum[r][c]);                       \
+                }                                                                                  \
+            }                                                                                      \
+        }                                                                                          \
+        for (size_t r = 0; r < rows; r++)                                                          \
+            for (size_t c = 0; c < vectors; c++)                                                   \
+                _mm512_storeu_ps(out + r * out_stride + c * 16, sum[r][c]);                        \
+    }
+WIDE_BLOCKS(wide_blocks_6_2, 6, 2)
+WIDE_BLOCKS(wide_blocks_1_2, 1, 2)
+WIDE_BLOCKS(wide_blocks_8_1, 8, 1)
+WIDE_BLOCKS(wide_blocks_1_1, 1, 1)
+
+/* The columns of multiply_blocks() in whole sixteens; returns how many. */
+static size_t multiply_wide_blocks(const float *const *in, size_t blocks, size_t n, size_t a,
+                                   const float *weight, size_t b, float *out, size_t out_stride)
+{
+    size_t c = 0;
+#define ROWS(tile, rows)                                                                           \
+    for (; r + rows <= n; r += rows)                                                               \
+        tile(in + r * blocks, blocks, a, weight + c, b, out + r * out_stride + c, out_stride);
+    for (; c + 32 <= b; c += 32) {
+        size_t r = 0;
+        ROWS(wide_blocks_6_2, 6)
+        ROWS(wide_blocks_1_2, 1)
+    }
+    if (c + 16 <= b) {
+        size_t r = 0;
+        ROWS(wide_blocks_8_1, 8)
+        ROWS(wide_blocks_1_1, 1)
+        c += 16;
+    }
+#undef ROWS
+    return c;
+}
+
 #define ASCC_USE_AVX2
 #define SEARCH search_avx512
 #define SEARCH_CUBE search_cube_avx512
 #define MULTIPLY_FIRST multiply_wide
+#define MULTIPLY_BLOCKS_FIRST multiply_wide_blocks
 #define ASCC_VARIANT ascc_kernels_avx512
 #include "body.h"

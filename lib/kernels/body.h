@@ -569,6 +569,63 @@ static void multiply(const float *in, size_t in_stride, size_t n, size_t a, cons
     }
 }
 
+/* TILE over blocks of inputs. */
+#define BLOCKS(name, rows, vectors)                                                                \
+    static void name(const float *const *in, size_t blocks, size_t a,                              \
+                     const float *RESTRICT weight, size_t b, float *RESTRICT out,                  \
+                     size_t out_stride)                                                            \
+    {                                                                                              \
+        vector sum[rows][vectors];                                                                 \
+        for (size_t r = 0; r < rows; r++)                                                          \
+            for (size_t c = 0; c < vectors; c++)                                                   \
+                sum[r][c] = load(out + r * out_stride + c * LANES);                                \
+        for (size_t k = 0; k < blocks; k++) {                                                      \
+            const float *from[rows];                                                               \
+            for (size_t r = 0; r < rows; r++)                                                      \
+                from[r] = in[r * blocks + k];                                                      \
+            for (size_t i = 0; i < a; i++, weight += b) {                                          \
+                vector w[vectors];                                                                 \
+                for (size_t c = 0; c < vectors; c++)                                               \
+                    w[c] = load(weight + c * LANES);                                               \
+                for (size_t r = 0; r < rows; r++) {                                                \
+                    const vector value = fill(from[r][i]);                                         \
+                    for (size_t c = 0; c < vectors; c++)                                           \
+                        sum[r][c] = fused(value, w[c], sum[r][c]);                                 \
+                }                                                                                  \
+            }                                                                                      \
+        }                                                                                          \
+        for (size_t r = 0; r < rows; r++)                                                          \
+            for (size_t c = 0; c < vectors; c++)                                                   \
+                store(out + r * out_stride + c * LANES, sum[r][c]);                                \
+    }
+BLOCKS(blocks_4_2, 4, 2)
+BLOCKS(blocks_1_2, 1, 2)
+BLOCKS(blocks_6_1, 6, 1)
+BLOCKS(blocks_1_1, 1, 1)
+
+static void multiply_blocks(const float *const *in, size_t blocks, size_t n, size_t a,
+                            const float *weight, size_t b, float *out, size_t out_stride)
+{
+    size_t c = 0;
+#ifdef MULTIPLY_BLOCKS_FIRST
+    c = MULTIPLY_BLOCKS_FIRST(in, blocks, n, a, weight, b, out, out_stride);
+#endif
+#define ROWS(tile, rows)                                                                           \
+    for (; r + rows <= n; r += rows)                                                               \
+        tile(in + r * blocks, blocks, a, weight + c, b, out + r * out_stride + c, out_stride);
+    for (; c + 2 * LANES <= b; c += 2 * LANES) {
+        size_t r = 0;
+        ROWS(blocks_4_2, 4)
+        ROWS(blocks_1_2, 1)
+    }
+    if (c < b) {
+        size_t r = 0;
+        ROWS(blocks_6_1, 6)
+        ROWS(blocks_1_1, 1)
+    }
+#undef ROWS
+}
+
 /* out[outputs] of one pair: a kernel between `count` corners, times both sides' features. */
 #define PAIR(name, outputs, count)                                                                 \
     static inline void name(const float *RESTRICT share, const size_t *RESTRICT offset,            \
@@ -1209,6 +1266,7 @@ void ASCC_VARIANT(ascc_kernels *kernels)
     kernels->pair_lines = pair_lines;
     kernels->moments = moments;
     kernels->multiply = multiply;
+    kernels->multiply_blocks = multiply_blocks;
     kernels->pair_terms = pair_terms;
     kernels->pair_impulses = pair_impulses;
     kernels->add_impulses = add_impulses;

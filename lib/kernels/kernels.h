@@ -103,6 +103,11 @@ typedef struct ascc_kernels {
     void (*multiply)(const float *in, size_t in_stride, size_t n, size_t a, const float *weight,
                      size_t b, float *out, size_t out_stride);
 
+    /* The same of inputs in blocks that lie anywhere: out[n][out_stride] += in[n][block][a] *
+     * weight[block][a][b]. */
+    void (*multiply_blocks)(const float *const *in, size_t blocks, size_t n, size_t a,
+                            const float *weight, size_t b, float *out, size_t out_stride);
+
     /* factor[m * stride + j] = basis function m of pair j, m = bump * harmonics + harmonic:
      * (1 - (bumps * distance - bump)^2)^2 where that square is below 1, else 0, times a harmonic of
      * the direction (docs/file-format.md): 1; 3 or 5 of them in the plane; 4 or 9 in space. Fills up

@@ -90,6 +90,9 @@ typedef struct ascc_operation {
 
     /* ---- Running ---- */
 
+    /* Makes what its forward and backward read besides, once a step; what terms share by their first list goes to
+     * run->table. errors: MEMORY. NULL = nothing. */
+    ascc_status (*prepare)(const struct ascc_network_run *run, const ascc_term *term);
     /* Adds to the tile's rows. */
     void (*forward)(const struct ascc_tile *tile, const ascc_term *term);
     /* The columns of the tile's rows that its matrix multiplies, one after another in tile->column; returns how

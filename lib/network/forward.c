@@ -256,6 +256,18 @@ static bool take_values(ascc_network_run *run, int32_t l, bool passed_on, size_t
     return true;
 }
 
+/* What the terms of a layer want made first. */
+static ascc_status prepare_terms(const ascc_network_run *run, const ascc_layer *layer)
+{
+    ascc_status status = ASCC_OK;
+    for (int32_t t = 0; t < layer->term_count && status == ASCC_OK; t++) {
+        const ascc_term *term = &run->plan->term[layer->first_term + t];
+        if (term->operation->prepare)
+            status = term->operation->prepare(run, term);
+    }
+    return status;
+}
+
 static ascc_status compute_layer(ascc_network_run *run, int32_t l, uint32_t *list)
 {
     const ascc_layer *layer = &run->plan->layer[l];
@@ -267,6 +279,9 @@ static ascc_status compute_layer(ascc_network_run *run, int32_t l, uint32_t *lis
     size_t next_width;
     if (is_begun(run->network, l) && layer->term_count == 1)
         return ASCC_OK;
+    const ascc_status status = prepare_terms(run, layer);
+    if (status != ASCC_OK)
+        return status;
     if (!take_values(run, l, passed_on, &next_width))
         return ascc_fail(tools->message, ASCC_ERROR_MEMORY, "no memory for layer %s", layer->name);
     job.sizes = ascc_network_sizes(run, layer);

@@ -58,7 +58,8 @@ typedef struct ascc_network_run {
     ascc_hierarchy *hierarchy;
     const ascc_search_tools *tools;
     ascc_value *value;
-    ascc_rows *rows; /* [key_count] */
+    ascc_rows *rows;  /* [key_count] */
+    uint32_t **table; /* [key_count] what operations make of a list, else NULL */
     size_t neighbor_count;
     uint32_t longest;
 } ascc_network_run;
