@@ -754,24 +754,34 @@ static void find_displacements(const ascc_lines *l, size_t row, const uint32_t *
             d[c][i] = (double)at[c][i];
 }
 
+/* Lines from a row's place to those of n neighbours. */
+static void find_lines(const double *place, size_t row, const uint32_t *neighbor, size_t n,
+                       double line[3][ASCC_PAIR_BATCH])
+{
+    const double *here = place + row * 3;
+    for (size_t i = 0; i < n; i++) {
+        const double *there = place + (size_t)neighbor[i] * 3;
+        for (size_t c = 0; c < 3; c++)
+            line[c][i] = there[c] - here[c];
+    }
+}
+
 /* Strengths times the cosine between what the network sees, d, and the lines between the places, which d
  * becomes. */
 static void turn_lines(const ascc_lines *l, size_t row, const uint32_t *neighbor, size_t n,
                        double d[3][ASCC_PAIR_BATCH], float *strength)
 {
-    const double *own = l->place + row * 3;
+    double line[3][ASCC_PAIR_BATCH];
+    find_lines(l->place, row, neighbor, n, line);
     for (size_t i = 0; i < n; i++) {
-        double along = 0.0, square = 0.0, seen = 0.0;
-        for (size_t c = 0; c < 3; c++) {
-            const double line = l->place[(size_t)neighbor[i] * 3 + c] - own[c];
-            seen += d[c][i] * d[c][i];
-            along += line * d[c][i];
-            square += line * line;
-            d[c][i] = line;
-        }
-        const double lengths = sqrt(seen * square);
+        const double x = line[0][i], y = line[1][i], z = line[2][i];
+        const double seen = d[0][i] * d[0][i] + d[1][i] * d[1][i] + d[2][i] * d[2][i];
+        const double along = x * d[0][i] + y * d[1][i] + z * d[2][i];
+        const double lengths = sqrt(seen * (x * x + y * y + z * z));
         strength[i] *= lengths > 0.0 ? (float)(along / lengths) : 0.0f;
     }
+    for (size_t c = 0; c < 3; c++)
+        memcpy(d[c], line[c], n * sizeof line[c][0]);
 }
 
 /* Speeds of approach of n pairs times the length of their line d. */
@@ -1126,17 +1136,17 @@ static void divergence(const ascc_gradients *pairs, size_t begin, size_t end, fl
 static void turn_terms(const double *place, size_t row, const uint32_t *neighbor, size_t k,
                        float term[3][ASCC_PAIR_BATCH + LANES])
 {
-    const double *here = place + row * 3;
+    double line[3][ASCC_PAIR_BATCH];
+    find_lines(place, row, neighbor, k, line);
     for (size_t i = 0; i < k; i++) {
-        const double *there = place + (size_t)neighbor[i] * 3;
-        double line[3], square = 0.0, along = 0.0;
-        for (size_t c = 0; c < 3; c++) {
-            line[c] = there[c] - here[c];
-            square += line[c] * line[c];
-            along += line[c] * (double)term[c][i];
-        }
-        for (size_t c = 0; c < 3; c++)
-            term[c][i] = square > 0.0 ? (float)(along / square * line[c]) : 0.0f;
+        const double x = line[0][i], y = line[1][i], z = line[2][i];
+        const double along =
+            x * (double)term[0][i] + y * (double)term[1][i] + z * (double)term[2][i];
+        const double square = x * x + y * y + z * z;
+        const double share = square > 0.0 ? along / square : 0.0;
+        term[0][i] = (float)(share * x);
+        term[1][i] = (float)(share * y);
+        term[2][i] = (float)(share * z);
     }
 }
 
