@@ -19,6 +19,7 @@
 #define PADDING 16
 #define CELLS 64
 #define BLAS_ROWS 4096
+#define TAPS 27
 
 static const int32_t cells[3] = {4, 4, 4};
 
@@ -118,6 +119,24 @@ static void run_layer(void *data)
     }
 }
 
+/* A stencil over rows that lie anywhere, as many as each has taps. */
+static void run_stencil(void *data)
+{
+    const kernel_job *j = data;
+    const ascc_rows *rows = &j->field.rows;
+    const float *in[TILE * TAPS];
+    for (size_t i = 0; i < j->field.points.count; i += TILE) {
+        const size_t n = ascc_min_size(TILE, j->field.points.count - i);
+        for (size_t r = i; r < i + n; r++)
+            for (size_t t = 0; t < TAPS; t++)
+                in[(r - i) * TAPS + t] =
+                    j->feature +
+                    rows->neighbor[rows->start[r] + (t < rows->count[r] ? t : 0)] * j->a;
+        memset(j->out + i * j->b, 0, n * j->b * sizeof(float));
+        j->kernels->multiply_blocks(in, TAPS, n, j->a, j->weight, j->b, j->out + i * j->b, j->b);
+    }
+}
+
 #ifdef BENCH_HAVE_OPENBLAS
 static void sgemm(const kernel_job *j, const float *in, size_t stride, size_t n)
 {
@@ -185,7 +204,7 @@ static void close_job(kernel_job *j)
 
 /* ---- The list ---- */
 
-enum { NONE, GATHER, MULTIPLY, LAYER };
+enum { NONE, GATHER, MULTIPLY, LAYER, STENCIL };
 
 static const struct kernel_case {
     const char *name;
@@ -204,6 +223,8 @@ static const struct kernel_case {
     {"layer 32->32", run_layer, LAYER, 32, 32},
     {"layer 16->16", run_layer, LAYER, 16, 16},
     {"layer 8->8", run_layer, LAYER, 8, 8},
+    {"stencil 32->32", run_stencil, STENCIL, 32, 32},
+    {"stencil 16->16", run_stencil, STENCIL, 16, 16},
 };
 
 static double gather_flops(const kernel_job *j, size_t a)
@@ -218,6 +239,8 @@ static double multiply_flops(const kernel_job *j, size_t a, size_t b)
 
 static double flops_of(const kernel_job *j, const struct kernel_case *c)
 {
+    if (c->work == STENCIL)
+        return 2.0 * TAPS * (double)(c->a * c->b) * (double)j->field.points.count;
     return (c->work & GATHER ? gather_flops(j, c->a) : 0.0) +
            (c->work & MULTIPLY ? multiply_flops(j, c->a, c->b) : 0.0);
 }

@@ -11,7 +11,8 @@ double bench_multiply_add_avx512(size_t rounds)
     for (int i = 0; i < SUMS; i++)
         sum[i] = _mm512_set1_ps((float)i);
     const __m512 m = _mm512_set1_ps(0.5f);
-    for (size_t r = 0; r < rounds; r++)
+    for (size_t r = 0; r < rounds; r++) /* unrolled, so that sums are registers */
+#pragma GCC unroll 24
         for (int i = 0; i < SUMS; i++)
             sum[i] = _mm512_fmadd_ps(sum[i], m, m);
     for (int i = 1; i < SUMS; i++)

@@ -97,7 +97,8 @@ static void search_finds_the_points_within_the_limit_on_every_cpu(void **state)
         for (int t = 0; t < count; t++) {
             uint32_t found[100];
             const size_t begin = n / 5;
-            const size_t got = table[t].search(&points, begin, n, q[0], q[1], q[2], limit, found);
+            const ascc_run runs[2] = {{begin, n / 2}, {n / 2, n}};
+            const size_t got = table[t].search(&points, runs, 2, q[0], q[1], q[2], limit, found);
             size_t k = 0;
             for (size_t i = begin; i < n; i++) {
                 const double dx = (double)x[i] - q[0], dy = (double)y[i] - q[1],
@@ -135,7 +136,8 @@ static void search_cube_finds_the_points_within_on_every_cpu(void **state)
         const ascc_coordinates points = {x, y, z};
         for (int t = 0; t < count; t++) {
             uint32_t found[100];
-            const size_t got = table[t].search_cube(&points, n / 5, n, 0, 0, 0, inverse, found);
+            const ascc_run runs[2] = {{n / 5, n / 3}, {n / 3, n}};
+            const size_t got = table[t].search_cube(&points, runs, 2, 0, 0, 0, inverse, found);
             size_t k = 0;
             for (size_t i = n / 5; i < n; i++)
                 if (abs(x[i]) < 6999999 && abs(y[i]) < 6999999 && abs(z[i]) < 6999999)
@@ -154,10 +156,11 @@ static void search_sees_across_the_wrap_of_the_low_words(void **state)
     const ascc_coordinates points = {x, zero, zero};
     for (int t = 0; t < count; t++) {
         uint32_t found[20];
-        assert_int_equal(table[t].search(&points, 0, 1, INT32_MAX - 10, 0, 0, 21.5f * 21.5f, found),
-                         1);
-        assert_int_equal(table[t].search(&points, 0, 1, INT32_MAX - 10, 0, 0, 20.5f * 20.5f, found),
-                         0);
+        const ascc_run all = {0, 1};
+        assert_int_equal(
+            table[t].search(&points, &all, 1, INT32_MAX - 10, 0, 0, 21.5f * 21.5f, found), 1);
+        assert_int_equal(
+            table[t].search(&points, &all, 1, INT32_MAX - 10, 0, 0, 20.5f * 20.5f, found), 0);
     }
 }
 
@@ -230,6 +233,41 @@ static void geometry_has_the_same_bits_on_every_cpu(void **state)
             check_guard(want.x, k);
             drop_pairs(&want);
         }
+}
+
+static void directions_are_those_of_the_geometry_on_every_cpu(void **state)
+{
+    (void)state;
+    ascc_kernels table[16];
+    const int count = tables(table);
+    int32_t at[3][64], place[64 * 4];
+    for (size_t i = 0; i < 64 * 4; i++) {
+        place[i] = (int32_t)(next() << 1) / 64;
+        if (i % 4 < 3)
+            at[i % 4][i / 4] = place[i];
+    }
+    const ascc_coordinates points = {at[0], at[1], at[2]};
+    for (size_t k = 0; k < 40; k++) {
+        uint32_t neighbor[40];
+        const size_t room = (k + 7) / 8 * 8;
+        for (size_t i = 0; i < k; i++)
+            neighbor[i] = i == 2 ? 7 : next() % 64; /* 7: the row itself */
+        pair_arrays want = take_pairs(room);
+        const ascc_pairs a = as_pairs(&want);
+        table[0].geometry(&points, neighbor, k, place[28], place[29], place[30], 0x1p-25f, 3, &a);
+        for (int t = 0; t < count; t++) {
+            pair_arrays got = take_pairs(room);
+            const ascc_pairs b = as_pairs(&got);
+            table[t].directions(place, neighbor, k, place + 28, 0x1p-25f, &b);
+            check_same_bits(want.x, got.x, k, "x");
+            check_same_bits(want.y, got.y, k, "y");
+            check_same_bits(want.z, got.z, k, "z");
+            check_same_bits(want.distance, got.distance, k, "distance");
+            check_guard(got.distance, room);
+            drop_pairs(&got);
+        }
+        drop_pairs(&want);
+    }
 }
 
 static void geometry_of_opposite_displacements_is_opposite(void **state)
@@ -498,45 +536,117 @@ static void moments_equal_doubles_and_have_the_same_bits_on_every_cpu(void **sta
     }
 }
 
-static void pair_strengths_equal_doubles_and_have_the_same_bits_on_every_cpu(void **state)
+/* ---- pairs along lines ---- */
+
+#define LINE_ROWS 50
+#define LINE_RADIUS 50000000
+
+typedef struct lines_case {
+    int32_t at[LINE_ROWS * 4];
+    float coefficient[(LINE_ROWS + 1) * 16], motion[(LINE_ROWS + 1) * 8];
+    double place[LINE_ROWS * 3], mass[ASCC_PAIR_BATCH];
+    uint32_t neighbor[ASCC_PAIR_BATCH];
+    ascc_lines lines;
+} lines_case;
+
+/* options: 1 = neighbours are rows, 2 = damped, 4 = turned, 8 = in the plane, 16 = a limit that cuts off. */
+static void random_lines(lines_case *c, size_t bumps, unsigned options)
+{
+    const size_t d = options & 8 ? 2 : 3;
+    for (size_t i = 0; i < LINE_ROWS * 3; i++) {
+        const size_t at = i / 3 * 4 + i % 3;
+        c->at[at] = i % 3 < d ? (int32_t)(uniform() * LINE_RADIUS / 4) : 0;
+        c->place[i] = c->at[at] + 1e6 * (double)uniform() * (i % 3 < d);
+    }
+    for (size_t i = 0; i < sizeof c->coefficient / sizeof *c->coefficient; i++) /* [row][bump][2] */
+        c->coefficient[i] = i % 16 / 2 < bumps && (i % 2 == 0 || options & 2) ? uniform() : 0.0f;
+    for (size_t i = 0; i < sizeof c->motion / sizeof *c->motion; i++)
+        c->motion[i] = uniform();
+    for (size_t k = 0; k < ASCC_PAIR_BATCH; k++) {
+        c->neighbor[k] = 1 + next() % (LINE_ROWS - 1);
+        c->mass[k] = 1.5 + (double)uniform();
+    }
+    for (int i = 0; i < 3; i++) { /* neighbour 1 lies where row 0 does; all others differ */
+        c->at[4 + i] = c->at[i];
+        c->place[3 + i] = c->place[i];
+    }
+    c->lines = (ascc_lines){.row = c->at,
+                            .neighbor = c->at,
+                            .inverse_radius = 1.0f / LINE_RADIUS,
+                            .bumps = bumps,
+                            .dimension = d,
+                            .both = options & 1,
+                            .coefficient = options & 1 ? c->coefficient : NULL,
+                            .motion = options & 2 ? c->motion : NULL,
+                            .a = 8,
+                            .area = options & 1 ? NULL : c->motion + 5,
+                            .area_stride = 8,
+                            .place = (options & 5) == 5 ? c->place : NULL,
+                            .factor = 1e9,
+                            .limit = options & 16 ? 0.2 : INFINITY};
+}
+
+/* The impulse of row 0 from neighbour j, from docs/method.md. */
+static void impulse_of(const lines_case *c, size_t j, double mass, double impulse[3])
+{
+    const ascc_lines *l = &c->lines;
+    double seen[3], line[3], u[3], distance = 0.0, length = 0.0, cosine = 0.0, approach = 0.0;
+    double part[2] = {0.0, 0.0};
+    for (size_t i = 0; i < 3; i++) {
+        seen[i] = (double)c->at[j * 4 + i] - (double)c->at[i];
+        line[i] = l->place ? c->place[j * 3 + i] - c->place[i] : seen[i];
+        distance += seen[i] * seen[i];
+        length += line[i] * line[i];
+        cosine += seen[i] * line[i];
+    }
+    distance = sqrt(distance);
+    length = sqrt(length);
+    cosine = distance > 0.0 && length > 0.0 ? cosine / distance / length : 0.0;
+    for (size_t i = 0; i < 3; i++) {
+        u[i] = length > 0.0 ? line[i] / length : 0.0;
+        if (l->motion && i < l->dimension)
+            approach +=
+                u[i] * ((double)c->motion[i] - (l->both ? (double)c->motion[j * 8 + i] : 0.0));
+    }
+    for (size_t b = 0; b < l->bumps; b++)
+        for (size_t p = 0; p < 2; p++)
+            part[p] += bump_of(distance / LINE_RADIUS, l->bumps, b) *
+                       ((double)c->coefficient[b * 2 + p] +
+                        (l->both ? (double)c->coefficient[j * 16 + b * 2 + p] : 0.0));
+    const double area = l->area ? (double)c->motion[j * 8 + 5] : 1.0;
+    const double strength = area * ((l->place ? cosine : 1.0) * part[0] - part[1] * approach);
+    const double total = fmax(-l->limit, fmin(l->limit, strength));
+    for (size_t i = 0; i < 3; i++)
+        impulse[i] = total * l->factor * mass * u[i];
+}
+
+static void pair_lines_equal_doubles_and_have_the_same_bits_on_every_cpu(void **state)
 {
     (void)state;
     ascc_kernels table[16];
     const int count = tables(table);
-    for (size_t bumps = 1; bumps <= 8; bumps++)
-        for (size_t k = 0; k < 20; k++) {
-            float *distance = floats(k + 1), *center = floats(8), *feature = floats(50 * 8);
-            uint32_t neighbor[20];
-            for (size_t n = bumps; n < 8; n++) {
-                center[n] = 0.0f;
-                for (size_t i = 0; i < 50; i++)
-                    feature[i * 8 + n] = 0.0f;
+    for (unsigned options = 0; options < 32; options++)
+        for (size_t bumps = 1; bumps <= 8; bumps++)
+            for (size_t k = 0; k <= ASCC_PAIR_BATCH; k = k < 10 ? k + 1 : k + 9) {
+                static lines_case c;
+                double want[3][ASCC_PAIR_BATCH], got[3][ASCC_PAIR_BATCH];
+                const size_t step = k % 2;
+                random_lines(&c, bumps, options);
+                table[0].pair_lines(&c.lines, 0, c.coefficient, c.neighbor, k, c.mass, step, want);
+                for (size_t j = 0; j < k; j++) {
+                    double right[3];
+                    impulse_of(&c, c.neighbor[j], c.mass[step ? j : 0], right);
+                    for (size_t i = 0; i < 3; i++)
+                        assert_true(fabs(right[i] - want[i][j]) < 2e4);
+                }
+                for (int t = 1; t < count; t++) {
+                    table[t].pair_lines(&c.lines, 0, c.coefficient, c.neighbor, k, c.mass, step,
+                                        got);
+                    for (size_t i = 0; i < 3; i++)
+                        for (size_t j = 0; j < k; j++)
+                            assert_true(memcmp(&want[i][j], &got[i][j], sizeof(double)) == 0);
+                }
             }
-            float *want = guarded(k);
-            for (size_t i = 0; i < k; i++) {
-                distance[i] = fabsf(distance[i]);
-                neighbor[i] = next() % 50;
-            }
-            table[0].pair_strengths(distance, neighbor, k, center, feature, bumps, want);
-            check_guard(want, k);
-            for (size_t i = 0; i < k; i++) {
-                double sum = 0.0;
-                for (size_t n = 0; n < bumps; n++)
-                    sum += bump_of((double)distance[i], bumps, n) *
-                           ((double)center[n] + (double)feature[neighbor[i] * 8 + n]);
-                assert_true(fabs(sum - (double)want[i]) < 2e-6 * (double)bumps);
-            }
-            for (int t = 1; t < count; t++) {
-                float *got = guarded(k);
-                table[t].pair_strengths(distance, neighbor, k, center, feature, bumps, got);
-                check_same_bits(want, got, k + 8, "pair strengths");
-                free(got);
-            }
-            free(distance);
-            free(center);
-            free(feature);
-            free(want);
-        }
 }
 
 /* ---- gather, multiply, pair terms ---- */
@@ -621,6 +731,44 @@ static void gather_equals_doubles_and_has_the_same_bits_on_every_cpu(void **stat
                 }
                 free(want);
                 drop_gather(&c);
+            }
+}
+
+/* The same as of columns that hold the blocks one after another. */
+static void blocks_are_multiplied_as_columns_on_every_cpu(void **state)
+{
+    (void)state;
+    enum { MOST_ROWS = 19, MOST_BLOCKS = 27, PLACES = 40 };
+    static const size_t blocks[] = {0, 1, 9, MOST_BLOCKS}, inputs[] = {1, 8, 11, 16};
+    ascc_kernels table[16];
+    const int count = tables(table);
+    for (size_t n = 0; n <= MOST_ROWS; n++)
+        for (size_t b = 8; b <= 56; b += 8)
+            for (size_t i = 0; i < 16; i++) {
+                const size_t m = blocks[i / 4], a = inputs[i % 4], stride = b + 5;
+                float *source = floats(PLACES * 16), *weight = floats(m * a * b + 1);
+                float *column = floats(n * m * a + 1), *begin = floats(n * stride + 8);
+                float *want = guarded(n * stride);
+                const float *in[MOST_ROWS * MOST_BLOCKS];
+                for (size_t k = 0; k < n * m; k++) {
+                    in[k] = source + next() % PLACES * 16;
+                    memcpy(column + k * a, in[k], a * sizeof *column);
+                }
+                memcpy(want, begin, n * stride * sizeof *want);
+                table[0].multiply(column, m * a, n, m * a, weight, b, want, stride);
+                for (int t = 0; t < count; t++) {
+                    float *got = guarded(n * stride);
+                    memcpy(got, begin, n * stride * sizeof *got);
+                    table[t].multiply_blocks(in, m, n, a, weight, b, got, stride);
+                    check_same_bits(want, got, n * stride, "blocks");
+                    check_guard(got, n * stride);
+                    free(got);
+                }
+                free(source);
+                free(weight);
+                free(column);
+                free(begin);
+                free(want);
             }
 }
 
@@ -734,10 +882,16 @@ static void random_impulses(impulse_case *c)
     c->factor[0] = c->mass[0] = c->mass[1] = 1.0;
 }
 
-static int impulses(const ascc_kernels *table, impulse_case *c, size_t step, size_t k)
+/* Of both kernels that give impulses; added: what is given is made here, in space. */
+static int impulses(const ascc_kernels *table, impulse_case *c, size_t step, size_t k, bool added)
 {
-    return table->pair_impulses(c->term, c->factor, c->mass, step, 0x1p50, c->neighbor, k, c->own,
-                                c->sum);
+    double x[3][ASCC_PAIR_BATCH];
+    for (size_t j = 0; added && j < k; j++)
+        for (size_t i = 0; i < 3; i++)
+            x[i][j] = (double)c->term[j * 4 + i] * c->factor[i] * c->mass[step ? j : 0];
+    return added ? table->add_impulses(x, 0x1p50, c->neighbor, k, c->own, c->sum)
+                 : table->pair_impulses(c->term, c->factor, c->mass, step, 0x1p50, c->neighbor, k,
+                                        c->own, c->sum);
 }
 
 static void pair_impulses_are_the_nearest_integers_on_every_cpu(void **state)
@@ -756,9 +910,9 @@ static void pair_impulses_are_the_nearest_integers_on_every_cpu(void **state)
                     want.own[i] += (int64_t)rint(x);
                     want.sum[c.neighbor[j] * 4 + i] -= (int64_t)rint(x);
                 }
-            for (int t = 0; t < count; t++) {
+            for (int t = 0; t < 2 * count; t++) {
                 impulse_case got = c;
-                assert_int_equal(impulses(&table[t], &got, step, k), 1);
+                assert_int_equal(impulses(&table[t / 2], &got, step, k, t % 2), 1);
                 assert_true(memcmp(got.own, want.own, sizeof want.own) == 0);
                 assert_true(memcmp(got.sum, want.sum, sizeof want.sum) == 0);
             }
@@ -772,7 +926,7 @@ static void an_impulse_that_does_not_fit_is_told_on_every_cpu(void **state)
     const int count = tables(table);
     for (size_t k = 1; k <= MOST_PAIRS; k++)
         for (int fault = 0; fault < 6; fault++)
-            for (int t = 0; t < count; t++) {
+            for (int t = 0; t < 2 * count; t++) {
                 impulse_case c;
                 random_impulses(&c);
                 const size_t last = k - 1;
@@ -794,7 +948,7 @@ static void an_impulse_that_does_not_fit_is_told_on_every_cpu(void **state)
                     c.own[1] = INT64_MIN + 1000 * (int64_t)k - 1;
                     c.factor[1] = -1e3;
                 }
-                assert_int_equal(impulses(&table[t], &c, 0, k), 0);
+                assert_int_equal(impulses(&table[t / 2], &c, 0, k, t % 2), 0);
             }
 }
 
@@ -903,12 +1057,13 @@ static void sweeps_equal_doubles_and_have_the_same_bits_on_every_cpu(void **stat
                                       .g = {g[0], g[1], g[2]},
                                       .weight = weighted ? weight : NULL};
         for (int t = 0; t < count; t++) {
-            static float move[3][SWEPT], change[SWEPT];
-            float *const to[3] = {move[0], move[1], move[2]};
+            static float move[3][SWEPT], change[SWEPT], to[SWEPT * 4];
             table[t].push(&pairs, 0, 25, pressure, own, to);
             table[t].push(&pairs, 25, SWEPT, pressure, own, to);
             table[t].divergence(&pairs, 0, 31, own, to, change);
             table[t].divergence(&pairs, 31, SWEPT, own, to, change);
+            for (size_t i = 0; i < SWEPT * 3; i++)
+                move[i % 3][i / 3] = to[i / 3 * 4 + i % 3];
             for (size_t i = 0; i < SWEPT; i++) {
                 double sum = 0.0, size = 1.0;
                 for (int c = 0; c < 3; c++) {
@@ -936,6 +1091,134 @@ static void sweeps_equal_doubles_and_have_the_same_bits_on_every_cpu(void **stat
     }
 }
 
+static void kept_gradients_are_those_that_are_not_0_on_every_cpu(void **state)
+{
+    (void)state;
+    ascc_kernels table[16];
+    const int count = tables(table);
+    for (size_t k = 0; k < 70; k++) {
+        const size_t room = (k + 7) / 8 * 8;
+        float *from[3] = {floats(room), floats(room), floats(room)};
+        uint32_t neighbor[70];
+        for (size_t i = 0; i < k; i++) {
+            neighbor[i] = next();
+            for (int c = 0; c < 3; c++)
+                if (next() % 3 || k % 5 == 1)
+                    from[c][i] = i % 2 ? 0.0f : -0.0f;
+        }
+        const ascc_pairs pairs = {.x = from[0], .y = from[1], .z = from[2]};
+        for (int t = 0; t < count; t++) {
+            float *g[3] = {guarded(room), guarded(room), guarded(room)};
+            uint32_t to[72];
+            const size_t got = table[t].keep_gradients(&pairs, neighbor, k, 777, to, g);
+            size_t at = 0;
+            for (size_t i = 0; i < k; i++) {
+                if (from[0][i] == 0.0f && from[1][i] == 0.0f && from[2][i] == 0.0f)
+                    continue;
+                assert_true(at < got && to[at] == neighbor[i]);
+                for (int c = 0; c < 3; c++)
+                    assert_true(g[c][at] == from[c][i]);
+                at++;
+            }
+            assert_int_equal(got, (at + 7) / 8 * 8);
+            for (; at < got; at++)
+                assert_true(to[at] == 777 && g[0][at] == 0.0f && g[1][at] == 0.0f &&
+                            g[2][at] == 0.0f);
+            for (int c = 0; c < 3; c++) {
+                check_guard(g[c], room);
+                free(g[c]);
+            }
+        }
+        for (int c = 0; c < 3; c++)
+            free(from[c]);
+    }
+}
+
+/* Pairs of a row with rows after it, in doubles. */
+static void press_in_doubles(const ascc_gradients *pairs, const ascc_pressures *p, size_t row,
+                             double (*sum)[3])
+{
+    for (size_t k = pairs->start[row]; k < pairs->end[row]; k++) {
+        const size_t j = pairs->neighbor[k];
+        const double both = (double)p->pressure[row] + (double)p->pressure[j];
+        const double a = p->mass[p->uniform ? 0 : row], b = p->mass[p->uniform ? 0 : j];
+        double x[3], size = 0.0, along = 0.0, square = 0.0;
+        for (size_t c = 0; c < 3; c++) {
+            x[c] = -both * (double)pairs->g[c][k];
+            size += x[c] * x[c];
+        }
+        for (size_t c = 0; c < 3; c++) {
+            x[c] *= fmin(1.0, (double)p->limit / sqrt(size));
+            if (p->place) {
+                const double line = p->place[j * 3 + c] - p->place[row * 3 + c];
+                along += line * x[c];
+                square += line * line;
+            }
+        }
+        for (size_t c = 0; j > row && c < 3; c++) {
+            if (p->place)
+                x[c] = along / square * (p->place[j * 3 + c] - p->place[row * 3 + c]);
+            const double impulse = x[c] * p->factor * 2.0 * a * b / (a + b);
+            sum[row][c] += impulse;
+            sum[j][c] -= impulse;
+        }
+    }
+}
+
+static void pressure_impulses_equal_doubles_and_have_the_same_bits_on_every_cpu(void **state)
+{
+    (void)state;
+    enum { ROWS = 90, LONGEST = 88 }; /* rows of more than one batch */
+    ascc_kernels table[16];
+    const int count = tables(table);
+    static float g[3][ROWS * LONGEST], pressure[ROWS];
+    static uint32_t neighbor[ROWS * LONGEST];
+    static double mass[ROWS], place[ROWS * 3];
+    size_t start[ROWS], end[ROWS];
+    for (size_t i = 0; i < ROWS; i++) {
+        const size_t pairs = i % 3 ? next() % 40 : LONGEST - 3;
+        start[i] = i * LONGEST;
+        end[i] = start[i] + (pairs + 7) / 8 * 8;
+        for (size_t k = 0; k < end[i] - start[i]; k++) {
+            neighbor[start[i] + k] = k < pairs ? (uint32_t)((i + 1 + k) % ROWS) : (uint32_t)i;
+            for (int c = 0; c < 3; c++)
+                g[c][start[i] + k] = k < pairs ? uniform() : 0.0f;
+        }
+        pressure[i] = next() % 3 ? fabsf(uniform()) : 0.0f;
+        mass[i] = 1.5 + (double)uniform();
+        for (int c = 0; c < 3; c++)
+            place[i * 3 + (size_t)c] = (double)uniform();
+    }
+    const ascc_gradients pairs = {
+        .start = start, .end = end, .neighbor = neighbor, .g = {g[0], g[1], g[2]}};
+    for (int options = 0; options < 8; options++) {
+        static double want[ROWS][3];
+        static int64_t first[ROWS * 4], got[ROWS * 4];
+        const ascc_pressures p = {.pressure = pressure,
+                                  .limit = options & 1 ? 0.5f : 100.0f,
+                                  .factor = 1e9,
+                                  .mass = mass,
+                                  .uniform = options & 2,
+                                  .place = options & 4 ? place : NULL};
+        memset(want, 0, sizeof want);
+        for (size_t i = 0; i < ROWS; i++)
+            press_in_doubles(&pairs, &p, i, want);
+        for (int t = 0; t < count; t++) {
+            memset(got, 0, sizeof got);
+            for (size_t i = 0; i < ROWS; i++)
+                assert_int_equal(table[t].pressure_impulses(&pairs, &p, i, 0x1p50, got), 1);
+            for (size_t i = 0; i < ROWS * 4;
+                 i++) /* some 200 impulses of up to 1e10, 4 roundings each */
+                assert_true(i % 4 == 3 ? got[i] == 0
+                                       : fabs((double)got[i] - want[i / 4][i % 4]) < 2e5);
+            if (t == 0)
+                memcpy(first, got, sizeof got);
+            assert_memory_equal(first, got, sizeof got);
+        }
+        assert_int_equal(table[0].pressure_impulses(&pairs, &p, 0, 1.0, got), 0);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -943,17 +1226,21 @@ int main(void)
         cmocka_unit_test(search_cube_finds_the_points_within_on_every_cpu),
         cmocka_unit_test(search_sees_across_the_wrap_of_the_low_words),
         cmocka_unit_test(geometry_has_the_same_bits_on_every_cpu),
+        cmocka_unit_test(directions_are_those_of_the_geometry_on_every_cpu),
         cmocka_unit_test(geometry_of_opposite_displacements_is_opposite),
         cmocka_unit_test(the_volume_map_fills_the_cube_and_stays_inside),
         cmocka_unit_test(the_basis_equals_doubles_and_has_the_same_bits_on_every_cpu),
         cmocka_unit_test(at_the_centre_only_the_first_harmonic_counts),
         cmocka_unit_test(moments_equal_doubles_and_have_the_same_bits_on_every_cpu),
-        cmocka_unit_test(pair_strengths_equal_doubles_and_have_the_same_bits_on_every_cpu),
+        cmocka_unit_test(pair_lines_equal_doubles_and_have_the_same_bits_on_every_cpu),
         cmocka_unit_test(gather_equals_doubles_and_has_the_same_bits_on_every_cpu),
+        cmocka_unit_test(blocks_are_multiplied_as_columns_on_every_cpu),
         cmocka_unit_test(multiply_equals_doubles_and_has_the_same_bits_on_every_cpu),
         cmocka_unit_test(pair_terms_equal_doubles_and_have_the_same_bits_on_every_cpu),
         cmocka_unit_test(pair_impulses_are_the_nearest_integers_on_every_cpu),
         cmocka_unit_test(an_impulse_that_does_not_fit_is_told_on_every_cpu),
+        cmocka_unit_test(kept_gradients_are_those_that_are_not_0_on_every_cpu),
+        cmocka_unit_test(pressure_impulses_equal_doubles_and_have_the_same_bits_on_every_cpu),
         cmocka_unit_test(the_spline_equals_doubles_and_has_the_same_bits_on_every_cpu),
         cmocka_unit_test(sweeps_equal_doubles_and_have_the_same_bits_on_every_cpu),
     };

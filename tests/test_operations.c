@@ -322,7 +322,9 @@ static void go_back(const ascc_context *context, const ascc_model *model, const 
     free(packed);
 }
 
-static void run_library(ascc_context *context, const ascc_model *model, const scene *s, result *r)
+/* keeps: stores all values, as a way back needs them, and goes it. */
+static void run_library(ascc_context *context, const ascc_model *model, const scene *s, bool keeps,
+                        result *r)
 {
     const ascc_plan *plan = &model->plan;
     ascc_particles *particles = fill(context, s, plan->dimension);
@@ -332,11 +334,13 @@ static void run_library(ascc_context *context, const ascc_model *model, const sc
     const ascc_array out = {.data = r->position, .scalar = ASCC_DOUBLE};
     memcpy(motion.gravity, plan->gravity, sizeof motion.gravity);
     assert_int_equal(ascc_step_create(context, model, NULL, &step), ASCC_OK);
+    step->network.keeps_values = keeps;
     if (ascc_step_once(step, particles, &motion, true, &step->arena, &state) != ASCC_OK)
         fail_msg("step: %s", ascc_step_message(step));
     assert_int_equal(
         ascc_particles_get(particles, ASCC_FLUID, ASCC_POSITION, 0, s->fluid_count, &out), ASCC_OK);
-    go_back(context, model, s, &state, &motion, r);
+    if (keeps)
+        go_back(context, model, s, &state, &motion, r);
     ascc_step_destroy(&step);
     ascc_particles_destroy(&particles);
 }
@@ -462,10 +466,12 @@ static void check_variant(const recipe *from, int variant, double worst[2])
             continue;
         }
         ascc_model *model = load(context, &random);
-        result r = {.weight = NULL};
+        result r = {.weight = NULL}, passed_on = {.weight = NULL};
         if (!uses(&model->plan, from->operation))
             fail_msg("operation '%s': its recipe makes no network with it", from->operation);
-        run_library(context, model, &s, &r);
+        run_library(context, model, &s, true, &r);
+        run_library(context, model, &s, false, &passed_on);
+        assert_memory_equal(r.position, passed_on.position, sizeof r.position);
         if (sets++) {
             assert_memory_equal(r.position, first.position, sizeof r.position);
             assert_memory_equal(r.by_position, first.by_position, sizeof r.by_position);

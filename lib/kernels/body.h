@@ -19,38 +19,40 @@
 /* A variant may bring searches of its own. */
 #ifndef SEARCH
 #define SEARCH search
-static size_t search(const ascc_coordinates *points, size_t begin, size_t end, int32_t x, int32_t y,
-                     int32_t z, float limit, uint32_t *RESTRICT found)
+static size_t search(const ascc_coordinates *points, const ascc_run *runs, size_t count, int32_t x,
+                     int32_t y, int32_t z, float limit, uint32_t *RESTRICT found)
 {
-    size_t count = 0;
+    size_t n = 0;
     const uint32_t ux = (uint32_t)x, uy = (uint32_t)y, uz = (uint32_t)z;
-    for (size_t i = begin; i < end; i++) {
-        const float dx = (float)(int32_t)((uint32_t)points->x[i] - ux);
-        const float dy = (float)(int32_t)((uint32_t)points->y[i] - uy);
-        const float dz = (float)(int32_t)((uint32_t)points->z[i] - uz);
-        found[count] = (uint32_t)i;
-        count += dx * dx + dy * dy + dz * dz <= limit;
-    }
-    return count;
+    for (size_t r = 0; r < count; r++)
+        for (size_t i = runs[r].begin; i < runs[r].end; i++) {
+            const float dx = (float)(int32_t)((uint32_t)points->x[i] - ux);
+            const float dy = (float)(int32_t)((uint32_t)points->y[i] - uy);
+            const float dz = (float)(int32_t)((uint32_t)points->z[i] - uz);
+            found[n] = (uint32_t)i;
+            n += dx * dx + dy * dy + dz * dz <= limit;
+        }
+    return n;
 }
 #endif
 
 #ifndef SEARCH_CUBE
 #define SEARCH_CUBE search_cube
-static size_t search_cube(const ascc_coordinates *points, size_t begin, size_t end, int32_t x,
-                          int32_t y, int32_t z, float inverse, uint32_t *RESTRICT found)
+static size_t search_cube(const ascc_coordinates *points, const ascc_run *runs, size_t count,
+                          int32_t x, int32_t y, int32_t z, float inverse, uint32_t *RESTRICT found)
 {
-    size_t count = 0;
+    size_t n = 0;
     const uint32_t ux = (uint32_t)x, uy = (uint32_t)y, uz = (uint32_t)z;
-    for (size_t i = begin; i < end; i++) {
-        const float dx = fabsf((float)(int32_t)((uint32_t)points->x[i] - ux) * inverse);
-        const float dy = fabsf((float)(int32_t)((uint32_t)points->y[i] - uy) * inverse);
-        const float dz = fabsf((float)(int32_t)((uint32_t)points->z[i] - uz) * inverse);
-        const float xy = dx > dy ? dx : dy;
-        found[count] = (uint32_t)i;
-        count += (xy > dz ? xy : dz) < 1.0f;
-    }
-    return count;
+    for (size_t r = 0; r < count; r++)
+        for (size_t i = runs[r].begin; i < runs[r].end; i++) {
+            const float dx = fabsf((float)(int32_t)((uint32_t)points->x[i] - ux) * inverse);
+            const float dy = fabsf((float)(int32_t)((uint32_t)points->y[i] - uy) * inverse);
+            const float dz = fabsf((float)(int32_t)((uint32_t)points->z[i] - uz) * inverse);
+            const float xy = dx > dy ? dx : dy;
+            found[n] = (uint32_t)i;
+            n += (xy > dz ? xy : dz) < 1.0f;
+        }
+    return n;
 }
 #endif
 
@@ -171,6 +173,37 @@ static void geometry(const ascc_coordinates *points, const uint32_t *RESTRICT ne
         map_volume(px, py, pz, k);
     else if (mapping == 1)
         map_radial(px, py, pz, k);
+}
+
+/* Integers to load as vectors, moved as they are. */
+static inline const float *integers(const int32_t *p)
+{
+    return (const float *)(const void *)p;
+}
+
+static void directions(const int32_t *place, const uint32_t *neighbor, size_t k,
+                       const int32_t at[3], float inverse_radius, const ascc_pairs *pairs)
+{
+    const vector inverse = fill(inverse_radius);
+    for (size_t i = 0; i < k; i += LANES) {
+        const size_t last = k - i < LANES ? k - i - 1 : LANES - 1;
+        const float *from[LANES];
+        vector v[4];
+        for (size_t l = 0; l < LANES; l++)
+            from[l] =
+                (const float *)(const void *)(place +
+                                              (size_t)neighbor[i + (l < last ? l : last)] * 4);
+        load_quads(from, v);
+        const vector x = times(more_than(v[0], at[0]), inverse);
+        const vector y = times(more_than(v[1], at[1]), inverse);
+        const vector z = times(more_than(v[2], at[2]), inverse);
+        const vector n = root(add(add(times(x, x), times(y, y)), times(z, z)));
+        const vector s = over(fill(1.0f), larger(n, fill(1e-30f))); /* 0 of 0 */
+        store(pairs->x + i, times(x, s));
+        store(pairs->y + i, times(y, s));
+        store(pairs->z + i, times(z, s));
+        store(pairs->distance + i, n);
+    }
 }
 
 /* Where eight neighbours lie among the cells: the lowest of the cells around each, and the weights of
@@ -405,91 +438,65 @@ static void gather_basis(const float *factor, size_t stride, size_t bumps, size_
         }
 }
 
-static void pair_strengths(const float *distance, const uint32_t *neighbor, size_t k,
-                           const float *center, const float *feature, size_t bumps, float *out)
-{
-    static const float numbers[LANES] = {0.0f, 1.0f, 2.0f, 3.0f, 4.0f, 5.0f, 6.0f, 7.0f};
-    const vector number = load(numbers), count = fill((float)bumps), own = load(center);
-    for (size_t i = 0; i < k; i++) {
-        const vector both = add(own, load(feature + (size_t)neighbor[i] * LANES));
-        out[i] = total(times(bump_at(fill(distance[i]), count, number), both));
-    }
-}
-
-/* Eight pairs: where they lie among the bumps, and what both bumps that reach them give. */
-typedef struct reached {
-    int32_t low[LANES];
-    float first[LANES], second[LANES];
-} reached;
-
-static inline void find_reached(const float *distance, size_t bumps, reached *out)
-{
-    const vector one = fill(1.0f), zero = fill(0.0f);
-    const vector t = times(load(distance), fill((float)bumps));
-    const vector low = whole(smaller(t, fill((float)(bumps - 1))));
-    const vector f = minus(t, low), g = minus(f, one);
-    const vector u = larger(minus(one, times(f, f)), zero);
-    const vector v = larger(minus(one, times(g, g)), zero);
-    store_whole(out->low, low);
-    store(out->first, times(u, u));
-    store(out->second, times(v, v));
-}
-
-/* The numbers of eight pairs: 1, direction, speed of approach, and the vector of the neighbour. */
+/* The numbers of eight pairs from i on, n of them there: 1, direction, speed of approach, and the vector of the
+ * neighbour; all but that times a weight. */
 static inline void pair_numbers(const ascc_pairs *pairs, size_t i, const uint32_t *neighbor,
                                 size_t n, const float *feature, size_t a, const float own[3],
                                 int wall, size_t dimension, const float *weight, size_t stride,
-                                vector q[LANES])
+                                float number[LANES][LANES])
 {
-    vector v[LANES];
-    for (size_t l = 0; l < LANES; l++)
-        v[l] = load(feature + (size_t)neighbor[i + (l < n ? l : 0)] * a);
-    transpose_lanes(v);
+    const float *from[LANES];
+    float scale[LANES];
+    vector v[4], relative[3];
+    for (size_t l = 0; l < LANES; l++) {
+        const size_t j = neighbor[i + (l < n ? l : 0)];
+        from[l] = feature + j * a;
+        if (weight)
+            scale[l] = weight[j * stride];
+    }
+    load_quads(from, v);
     if (dimension < 3)
         v[2] = fill(0.0f);
-    vector relative[3];
     for (size_t c = 0; c < 3; c++) {
         relative[c] = minus(wall ? fill(0.0f) : v[c], fill(own[c]));
-        v[c] = wall ? v[c] : relative[c];
+        store(number[5 + c], wall ? v[c] : relative[c]);
     }
-    q[0] = fill(1.0f);
-    q[1] = load(pairs->x + i);
-    q[2] = load(pairs->y + i);
-    q[3] = load(pairs->z + i);
-    q[4] = minus(fill(0.0f), add(add(times(q[1], relative[0]), times(q[2], relative[1])),
-                                 times(q[3], relative[2])));
-    if (weight) {
-        float scale[LANES];
-        for (size_t l = 0; l < LANES; l++)
-            scale[l] = weight[neighbor[i + (l < n ? l : 0)] * stride];
-        for (size_t m = 0; m < 5; m++)
-            q[m] = times(q[m], load(scale));
-    }
-    q[5] = v[0];
-    q[6] = v[1];
-    q[7] = v[2];
-    transpose_lanes(q);
+    const vector s = weight ? load(scale) : fill(1.0f);
+    const vector x = load(pairs->x + i), y = load(pairs->y + i), z = load(pairs->z + i);
+    const vector along =
+        add(add(times(x, relative[0]), times(y, relative[1])), times(z, relative[2]));
+    store(number[0], s);
+    store(number[1], times(x, s));
+    store(number[2], times(y, s));
+    store(number[3], times(z, s));
+    store(number[4], times(minus(fill(0.0f), along), s));
 }
 
+/* A lane for each bump: those that a pair does not reach add 0. */
 static void moments(const ascc_pairs *pairs, const uint32_t *neighbor, size_t k,
                     const float *feature, size_t a, const float own[3], int wall, size_t dimension,
                     const float *weight, size_t stride, size_t bumps, float *sum)
 {
-    memset(sum, 0, bumps * LANES * sizeof *sum);
+    static const float lanes[LANES] = {0.0f, 1.0f, 2.0f, 3.0f, 4.0f, 5.0f, 6.0f, 7.0f};
+    const vector bump = load(lanes), count = fill((float)bumps);
+    vector sums[LANES];
+    for (size_t c = 0; c < LANES; c++)
+        sums[c] = fill(0.0f);
     for (size_t i = 0; i < k; i += LANES) {
         const size_t n = k - i < LANES ? k - i : LANES;
-        vector q[LANES];
-        reached r;
-        pair_numbers(pairs, i, neighbor, n, feature, a, own, wall, dimension, weight, stride, q);
-        find_reached(pairs->distance + i, bumps, &r);
-        for (size_t l = 0; l < n; l++) {
-            float *to = sum + (size_t)r.low[l] * LANES;
-            store(to, fused(fill(r.first[l]), q[l], load(to)));
-            to += LANES;
-            if ((size_t)r.low[l] + 1 < bumps)
-                store(to, fused(fill(r.second[l]), q[l], load(to)));
+        float number[LANES][LANES];
+        pair_numbers(pairs, i, neighbor, n, feature, a, own, wall, dimension, weight, stride,
+                     number);
+        UNROLL for (size_t l = 0; l < n; l++)
+        {
+            const vector w = bump_at(fill(pairs->distance[i + l]), count, bump);
+            for (size_t c = 0; c < LANES; c++)
+                sums[c] = fused(w, fill(number[c][l]), sums[c]);
         }
     }
+    transpose_lanes(sums);
+    for (size_t b = 0; b < bumps; b++)
+        store(sum + b * LANES, sums[b]);
 }
 
 /* out[rows][vectors * 8] += in * weight with all sums in registers. */
@@ -562,6 +569,63 @@ static void multiply(const float *in, size_t in_stride, size_t n, size_t a, cons
     }
 }
 
+/* TILE over blocks of inputs. */
+#define BLOCKS(name, rows, vectors)                                                                \
+    static void name(const float *const *in, size_t blocks, size_t a,                              \
+                     const float *RESTRICT weight, size_t b, float *RESTRICT out,                  \
+                     size_t out_stride)                                                            \
+    {                                                                                              \
+        vector sum[rows][vectors];                                                                 \
+        for (size_t r = 0; r < rows; r++)                                                          \
+            for (size_t c = 0; c < vectors; c++)                                                   \
+                sum[r][c] = load(out + r * out_stride + c * LANES);                                \
+        for (size_t k = 0; k < blocks; k++) {                                                      \
+            const float *from[rows];                                                               \
+            for (size_t r = 0; r < rows; r++)                                                      \
+                from[r] = in[r * blocks + k];                                                      \
+            for (size_t i = 0; i < a; i++, weight += b) {                                          \
+                vector w[vectors];                                                                 \
+                for (size_t c = 0; c < vectors; c++)                                               \
+                    w[c] = load(weight + c * LANES);                                               \
+                for (size_t r = 0; r < rows; r++) {                                                \
+                    const vector value = fill(from[r][i]);                                         \
+                    for (size_t c = 0; c < vectors; c++)                                           \
+                        sum[r][c] = fused(value, w[c], sum[r][c]);                                 \
+                }                                                                                  \
+            }                                                                                      \
+        }                                                                                          \
+        for (size_t r = 0; r < rows; r++)                                                          \
+            for (size_t c = 0; c < vectors; c++)                                                   \
+                store(out + r * out_stride + c * LANES, sum[r][c]);                                \
+    }
+BLOCKS(blocks_4_2, 4, 2)
+BLOCKS(blocks_1_2, 1, 2)
+BLOCKS(blocks_6_1, 6, 1)
+BLOCKS(blocks_1_1, 1, 1)
+
+static void multiply_blocks(const float *const *in, size_t blocks, size_t n, size_t a,
+                            const float *weight, size_t b, float *out, size_t out_stride)
+{
+    size_t c = 0;
+#ifdef MULTIPLY_BLOCKS_FIRST
+    c = MULTIPLY_BLOCKS_FIRST(in, blocks, n, a, weight, b, out, out_stride);
+#endif
+#define ROWS(tile, rows)                                                                           \
+    for (; r + rows <= n; r += rows)                                                               \
+        tile(in + r * blocks, blocks, a, weight + c, b, out + r * out_stride + c, out_stride);
+    for (; c + 2 * LANES <= b; c += 2 * LANES) {
+        size_t r = 0;
+        ROWS(blocks_4_2, 4)
+        ROWS(blocks_1_2, 1)
+    }
+    if (c < b) {
+        size_t r = 0;
+        ROWS(blocks_6_1, 6)
+        ROWS(blocks_1_1, 1)
+    }
+#undef ROWS
+}
+
 /* out[outputs] of one pair: a kernel between `count` corners, times both sides' features. */
 #define PAIR(name, outputs, count)                                                                 \
     static inline void name(const float *RESTRICT share, const size_t *RESTRICT offset,            \
@@ -632,69 +696,329 @@ static void pair_terms(const ascc_pairs *pairs, const float *window, const uint3
     }
 }
 
+/* ---- Pairs along lines ---- */
+
+/* Strengths and dampings of eight pairs at these distances over the radius: of all bumps only two that lie next
+ * to each other are not 0. */
+static inline void find_strengths(const ascc_lines *l, float own[2][LANES],
+                                  const uint32_t *neighbor, const float *rho, float *strength,
+                                  float *damping)
+{
+    const vector one = fill(1.0f), zero = fill(0.0f);
+    const vector t = times(fill((float)l->bumps), load(rho));
+    const vector low = whole(smaller(t, fill(l->bumps > 1 ? (float)(l->bumps - 2) : 0.0f)));
+    const vector f = minus(t, low), g = minus(t, add(low, one));
+    const vector u = larger(minus(one, times(f, f)), zero);
+    const vector v = larger(minus(one, times(g, g)), zero);
+    int32_t first[LANES], second[LANES];
+    vector both[4] = {zero, zero, zero, zero};
+    store_whole(first, low);
+    store_whole(second, add(low, one));
+    if (l->both) {
+        const float *from[LANES];
+        for (size_t i = 0; i < LANES; i++)
+            from[i] = l->coefficient + (size_t)neighbor[i] * 16 + (size_t)first[i] * 2;
+        load_quads(from, both);
+    }
+    const vector s = add(times(times(u, u), add(pick_lanes(own[0], first), both[0])),
+                         times(times(v, v), add(pick_lanes(own[0], second), both[2])));
+    const vector d = add(times(times(u, u), add(pick_lanes(own[1], first), both[1])),
+                         times(times(v, v), add(pick_lanes(own[1], second), both[3])));
+    store(strength, s);
+    store(damping, d);
+}
+
+/* Displacements of n pairs as the network sees them, and their distances over the radius. */
+static void find_displacements(const ascc_lines *l, size_t row, const uint32_t *RESTRICT neighbor,
+                               size_t n, double d[3][ASCC_PAIR_BATCH], float *RESTRICT rho)
+{
+    int32_t at[3][ASCC_PAIR_BATCH];
+    const float inverse = l->inverse_radius;
+    for (size_t i = 0; i < n; i += LANES) {
+        const float *from[LANES];
+        vector v[4];
+        for (size_t j = 0; j < LANES; j++)
+            from[j] = integers(l->neighbor + (size_t)neighbor[i + j] * 4);
+        load_quads(from, v);
+        for (size_t c = 0; c < 3; c++)
+            store_more(at[c] + i, v[c], l->row[row * 4 + c]);
+    }
+    for (size_t i = 0; i < n; i++) {
+        const float dx = (float)at[0][i] * inverse;
+        const float dy = (float)at[1][i] * inverse;
+        const float dz = (float)at[2][i] * inverse;
+        rho[i] = sqrtf(dx * dx + dy * dy + dz * dz);
+    }
+    for (size_t c = 0; c < 3; c++)
+        for (size_t i = 0; i < n; i++)
+            d[c][i] = (double)at[c][i];
+}
+
+/* Lines from a row's place to those of n neighbours. */
+static void find_lines(const double *place, size_t row, const uint32_t *neighbor, size_t n,
+                       double line[3][ASCC_PAIR_BATCH])
+{
+    const double *here = place + row * 3;
+    for (size_t i = 0; i < n; i++) {
+        const double *there = place + (size_t)neighbor[i] * 3;
+        for (size_t c = 0; c < 3; c++)
+            line[c][i] = there[c] - here[c];
+    }
+}
+
+/* Strengths times the cosine between what the network sees, d, and the lines between the places, which d
+ * becomes. */
+static void turn_lines(const ascc_lines *l, size_t row, const uint32_t *neighbor, size_t n,
+                       double d[3][ASCC_PAIR_BATCH], float *strength)
+{
+    double line[3][ASCC_PAIR_BATCH];
+    find_lines(l->place, row, neighbor, n, line);
+    for (size_t i = 0; i < n; i++) {
+        const double x = line[0][i], y = line[1][i], z = line[2][i];
+        const double seen = d[0][i] * d[0][i] + d[1][i] * d[1][i] + d[2][i] * d[2][i];
+        const double along = x * d[0][i] + y * d[1][i] + z * d[2][i];
+        const double lengths = sqrt(seen * (x * x + y * y + z * z));
+        strength[i] *= lengths > 0.0 ? (float)(along / lengths) : 0.0f;
+    }
+    for (size_t c = 0; c < 3; c++)
+        memcpy(d[c], line[c], n * sizeof line[c][0]);
+}
+
+/* Speeds of approach of n pairs times the length of their line d. */
+static void find_approach(const ascc_lines *l, size_t row, const uint32_t *neighbor, size_t n,
+                          double d[3][ASCC_PAIR_BATCH], double *RESTRICT approach)
+{
+    float v[3][ASCC_PAIR_BATCH];
+    double own[3] = {0.0, 0.0, 0.0};
+    for (size_t c = 0; c < l->dimension; c++)
+        own[c] = (double)l->motion[row * l->a + c];
+    for (size_t i = 0; i < n; i += LANES) {
+        const float *from[LANES];
+        vector four[4] = {fill(0.0f), fill(0.0f), fill(0.0f), fill(0.0f)};
+        for (size_t j = 0; l->both && j < LANES; j++)
+            from[j] = l->motion + (size_t)neighbor[i + j] * l->a;
+        if (l->both)
+            load_quads(from, four);
+        store(v[0] + i, four[0]);
+        store(v[1] + i, four[1]);
+        store(v[2] + i, l->dimension > 2 ? four[2] : fill(0.0f));
+    }
+    for (size_t i = 0; i < n; i++)
+        approach[i] = (own[0] - (double)v[0][i]) * d[0][i] + (own[1] - (double)v[1][i]) * d[1][i] +
+                      (own[2] - (double)v[2][i]) * d[2][i];
+}
+
+static void pair_lines(const ascc_lines *l, size_t row, const float coefficient[16],
+                       const uint32_t *neighbor, size_t k, const double *mass, size_t mass_step,
+                       double impulse[3][ASCC_PAIR_BATCH])
+{
+    float rho[ASCC_PAIR_BATCH], strength[ASCC_PAIR_BATCH], damping[ASCC_PAIR_BATCH], own[2][LANES];
+    double approach[ASCC_PAIR_BATCH], masses[ASCC_PAIR_BATCH];
+    uint32_t near[ASCC_PAIR_BATCH];
+    const size_t n = (k + LANES - 1) / LANES * LANES;
+    const double limit = l->limit, factor = l->factor;
+    double *RESTRICT x = impulse[0], *RESTRICT y = impulse[1], *RESTRICT z = impulse[2];
+    for (size_t i = 0; i < n; i++) {
+        near[i] = neighbor[i < k ? i : 0];
+        masses[i] = mass[i < k ? i * mass_step : 0];
+    }
+    for (size_t i = 0; i < LANES; i++) {
+        own[0][i] = coefficient[2 * i];
+        own[1][i] = coefficient[2 * i + 1];
+    }
+    find_displacements(l, row, near, n, impulse, rho);
+    for (size_t i = 0; i < n; i += LANES)
+        find_strengths(l, own, near + i, rho + i, strength + i, damping + i);
+    for (size_t i = 0; l->area && i < n; i++) {
+        const float area = l->area[near[i] * l->area_stride];
+        strength[i] *= area;
+        damping[i] *= area;
+    }
+    if (l->place)
+        turn_lines(l, row, near, n, impulse, strength);
+    if (l->motion)
+        find_approach(l, row, near, n, impulse, approach);
+    else
+        memset(approach, 0, n * sizeof *approach);
+    for (size_t i = 0; i < n; i++) {
+        const double length = sqrt(x[i] * x[i] + y[i] * y[i] + z[i] * z[i]);
+        const double inverse = length > 0.0 ? 1.0 / length : 0.0;
+        double s = (double)strength[i] - (double)damping[i] * (approach[i] * inverse);
+        s = s > limit ? limit : s < -limit ? -limit : s;
+        const double share = length > 0.0 ? s * factor * inverse : 0.0;
+        x[i] = x[i] * share * masses[i];
+        y[i] = y[i] * share * masses[i];
+        z[i] = z[i] * share * masses[i];
+    }
+}
+
+/* ---- Impulses to integers ---- */
+
 /* Rounds |x| < 2^51 to the nearest integer, ties to even, in any build: the low bits of x + this. */
 #define ROUND_MAGIC 6755399441055744.0
 
+/* What was given so far: to the row, and whether all of it could be held. Four doubles, and four integers, are
+ * one value. */
 #if defined(ASCC_USE_AVX2)
-/* The loop below on four doubles, same operations in the same order. */
-static int pair_impulses(const float *term, const double factor[4], const double *mass,
-                         size_t mass_step, double limit, const uint32_t *neighbor, size_t k,
-                         int64_t own[4], int64_t *sum)
+typedef __m256d quad;
+
+typedef struct given {
+    __m256i ours, wrong;
+    __m256d good, limit;
+} given;
+
+static inline quad times_quads(quad a, quad b)
 {
-    const __m256d magic = _mm256_set1_pd(ROUND_MAGIC), limits = _mm256_set1_pd(limit);
-    const __m256d sign = _mm256_set1_pd(-0.0), factors = _mm256_loadu_pd(factor);
-    const __m256i zero = _mm256_castpd_si256(magic);
-    __m256i ours = _mm256_loadu_si256((const __m256i *)own), wrong = _mm256_setzero_si256();
-    __m256d good = _mm256_castsi256_pd(_mm256_set1_epi64x(-1));
-    for (size_t j = 0; j < k; j++, mass += mass_step) {
-        __m256i *to = (__m256i *)(sum + (size_t)neighbor[j] * 4);
-        const __m256d terms = _mm256_cvtps_pd(_mm_loadu_ps(term + j * 4));
-        const __m256d x = _mm256_mul_pd(_mm256_mul_pd(terms, factors), _mm256_broadcast_sd(mass));
-        const __m256i quanta = _mm256_sub_epi64(_mm256_castpd_si256(_mm256_add_pd(x, magic)), zero);
-        const __m256i before = _mm256_loadu_si256(to), after = _mm256_sub_epi64(before, quanta);
-        const __m256i sums = _mm256_add_epi64(ours, quanta);
-        wrong = _mm256_or_si256(wrong, _mm256_and_si256(_mm256_xor_si256(before, quanta),
-                                                        _mm256_xor_si256(before, after)));
-        wrong = _mm256_or_si256(
-            wrong, _mm256_and_si256(_mm256_xor_si256(ours, sums), _mm256_xor_si256(quanta, sums)));
-        good = _mm256_and_pd(good, _mm256_cmp_pd(_mm256_andnot_pd(sign, x), limits, _CMP_LT_OQ));
-        _mm256_storeu_si256(to, after);
-        ours = sums;
-    }
-    _mm256_storeu_si256((__m256i *)own, ours);
-    return _mm256_movemask_pd(_mm256_castsi256_pd(wrong)) == 0 && _mm256_movemask_pd(good) == 15;
+    return _mm256_mul_pd(a, b);
+}
+
+static inline quad load_quad(const double *p)
+{
+    return _mm256_loadu_pd(p);
+}
+
+static inline quad quad_of_floats(const float *p)
+{
+    return _mm256_cvtps_pd(_mm_loadu_ps(p));
+}
+
+static inline given begin_given(const int64_t own[4], double limit)
+{
+    return (given){_mm256_loadu_si256((const __m256i *)own), _mm256_setzero_si256(),
+                   _mm256_castsi256_pd(_mm256_set1_epi64x(-1)), _mm256_set1_pd(limit)};
+}
+
+/* The integers nearest to x to the row, and from the neighbour's sums. */
+static inline void give(given *g, quad x, int64_t *sum)
+{
+    const __m256d magic = _mm256_set1_pd(ROUND_MAGIC), sign = _mm256_set1_pd(-0.0);
+    __m256i *to = (__m256i *)sum;
+    const __m256i quanta =
+        _mm256_sub_epi64(_mm256_castpd_si256(_mm256_add_pd(x, magic)), _mm256_castpd_si256(magic));
+    const __m256i before = _mm256_loadu_si256(to), after = _mm256_sub_epi64(before, quanta);
+    const __m256i sums = _mm256_add_epi64(g->ours, quanta);
+    g->wrong = _mm256_or_si256(g->wrong, _mm256_and_si256(_mm256_xor_si256(before, quanta),
+                                                          _mm256_xor_si256(before, after)));
+    g->wrong = _mm256_or_si256(g->wrong, _mm256_and_si256(_mm256_xor_si256(g->ours, sums),
+                                                          _mm256_xor_si256(quanta, sums)));
+    g->good =
+        _mm256_and_pd(g->good, _mm256_cmp_pd(_mm256_andnot_pd(sign, x), g->limit, _CMP_LT_OQ));
+    _mm256_storeu_si256(to, after);
+    g->ours = sums;
+}
+
+static inline int end_given(const given *g, int64_t own[4])
+{
+    _mm256_storeu_si256((__m256i *)own, g->ours);
+    return _mm256_movemask_pd(_mm256_castsi256_pd(g->wrong)) == 0 &&
+           _mm256_movemask_pd(g->good) == 15;
+}
+
+/* x, y, z of four pairs become four rows of x, y, z, 0. */
+static inline void rows_of_quads(const double *x, const double *y, const double *z, quad to[4])
+{
+    const quad a = load_quad(x), b = load_quad(y), c = load_quad(z), zero = _mm256_setzero_pd();
+    const quad ab0 = _mm256_unpacklo_pd(a, b), ab1 = _mm256_unpackhi_pd(a, b);
+    const quad c0 = _mm256_unpacklo_pd(c, zero), c1 = _mm256_unpackhi_pd(c, zero);
+    to[0] = _mm256_permute2f128_pd(ab0, c0, 0x20);
+    to[1] = _mm256_permute2f128_pd(ab1, c1, 0x20);
+    to[2] = _mm256_permute2f128_pd(ab0, c0, 0x31);
+    to[3] = _mm256_permute2f128_pd(ab1, c1, 0x31);
 }
 #else
+typedef struct quad {
+    double lane[4];
+} quad;
+
+typedef struct given {
+    uint64_t ours[4], wrong;
+    double limit;
+    int good;
+} given;
+
+static inline quad times_quads(quad a, quad b)
+{
+    for (int i = 0; i < 4; i++)
+        a.lane[i] *= b.lane[i];
+    return a;
+}
+
+static inline quad load_quad(const double *p)
+{
+    return (quad){{p[0], p[1], p[2], p[3]}};
+}
+
+static inline quad quad_of_floats(const float *p)
+{
+    return (quad){{(double)p[0], (double)p[1], (double)p[2], (double)p[3]}};
+}
+
+static inline given begin_given(const int64_t own[4], double limit)
+{
+    given g = {.limit = limit, .good = 1};
+    memcpy(g.ours, own, sizeof g.ours);
+    return g;
+}
+
+static inline void give(given *g, quad x, int64_t *sum)
+{
+    const double magic = ROUND_MAGIC;
+    uint64_t zero;
+    memcpy(&zero, &magic, sizeof zero);
+    for (size_t c = 0; c < 4; c++) {
+        const double shifted = x.lane[c] + magic;
+        uint64_t quanta, before;
+        memcpy(&quanta, &shifted, sizeof quanta);
+        quanta -= zero;
+        memcpy(&before, sum + c, sizeof before);
+        const uint64_t after = before - quanta, ours = g->ours[c] + quanta;
+        g->wrong |= (before ^ quanta) & (before ^ after);
+        g->wrong |= (g->ours[c] ^ ours) & (quanta ^ ours);
+        memcpy(sum + c, &after, sizeof after);
+        g->ours[c] = ours;
+        g->good &= fabs(x.lane[c]) < g->limit;
+    }
+}
+
+static inline int end_given(const given *g, int64_t own[4])
+{
+    memcpy(own, g->ours, sizeof g->ours);
+    return g->good && !(g->wrong >> 63);
+}
+
+static inline void rows_of_quads(const double *x, const double *y, const double *z, quad to[4])
+{
+    for (int i = 0; i < 4; i++)
+        to[i] = (quad){{x[i], y[i], z[i], 0.0}};
+}
+#endif
+
 static int pair_impulses(const float *term, const double factor[4], const double *mass,
                          size_t mass_step, double limit, const uint32_t *neighbor, size_t k,
                          int64_t own[4], int64_t *sum)
 {
-    const double magic = ROUND_MAGIC;
-    uint64_t zero, wrong = 0, given[4];
-    int good = 1;
-    memcpy(&zero, &magic, sizeof zero);
-    memcpy(given, own, sizeof given);
+    const quad factors = load_quad(factor);
+    given g = begin_given(own, limit);
     for (size_t j = 0; j < k; j++, mass += mass_step) {
-        int64_t *to = sum + (size_t)neighbor[j] * 4;
-        for (size_t c = 0; c < 4; c++) {
-            const double x = (double)term[j * 4 + c] * factor[c] * *mass;
-            const double shifted = x + magic;
-            uint64_t quanta, before;
-            memcpy(&quanta, &shifted, sizeof quanta);
-            quanta -= zero;
-            memcpy(&before, to + c, sizeof before);
-            const uint64_t after = before - quanta, ours = given[c] + quanta;
-            wrong |= (before ^ quanta) & (before ^ after);
-            wrong |= (given[c] ^ ours) & (quanta ^ ours);
-            memcpy(to + c, &after, sizeof after);
-            given[c] = ours;
-            good &= fabs(x) < limit;
-        }
+        const double m[4] = {*mass, *mass, *mass, *mass};
+        give(&g, times_quads(times_quads(quad_of_floats(term + j * 4), factors), load_quad(m)),
+             sum + (size_t)neighbor[j] * 4);
     }
-    memcpy(own, given, sizeof given);
-    return good && !(wrong >> 63);
+    return end_given(&g, own);
 }
-#endif
+
+static int add_impulses(double impulse[3][ASCC_PAIR_BATCH], double limit, const uint32_t *neighbor,
+                        size_t k, int64_t own[4], int64_t *sum)
+{
+    given g = begin_given(own, limit);
+    for (size_t j = 0; j < k; j += 4) {
+        quad rows[4];
+        rows_of_quads(impulse[0] + j, impulse[1] + j, impulse[2] + j, rows);
+        for (size_t i = 0; i < 4 && j + i < k; i++)
+            give(&g, rows[i], sum + (size_t)neighbor[j + i] * 4);
+    }
+    return end_given(&g, own);
+}
 
 /* ---- Relaxation ---- */
 
@@ -740,8 +1064,36 @@ static void spline(const ascc_pairs *pairs, const uint32_t *neighbor, size_t k, 
     sum[7] = 0.0f;
 }
 
+static size_t keep_gradients(const ascc_pairs *pairs, const uint32_t *neighbor, size_t k,
+                             uint32_t row, uint32_t *to, float *const g[3])
+{
+    size_t count = 0;
+    for (size_t i = 0; i < k; i += LANES) {
+        const vector x = load(pairs->x + i), y = load(pairs->y + i), z = load(pairs->z + i);
+        const unsigned there = k - i < LANES ? (1u << (k - i)) - 1 : 255u;
+        const kept lanes = kept_lanes(not_zero(x, y, z) & there);
+        uint32_t last[LANES];
+        const uint32_t *from = neighbor + i;
+        if (k - i < LANES) {
+            memcpy(last, from, (k - i) * sizeof *from);
+            memset(last + (k - i), 0, (LANES - (k - i)) * sizeof *last);
+            from = last;
+        }
+        store_kept_integers(to + count, from, lanes);
+        store_kept(g[0] + count, x, lanes);
+        store_kept(g[1] + count, y, lanes);
+        store_kept(g[2] + count, z, lanes);
+        count += lanes.count;
+    }
+    for (; count % LANES; count++) {
+        to[count] = row;
+        g[0][count] = g[1][count] = g[2][count] = 0.0f;
+    }
+    return count;
+}
+
 static void push(const ascc_gradients *pairs, size_t begin, size_t end, const float *pressure,
-                 float *const own[3], float *const move[3])
+                 float *const own[3], float *move)
 {
     for (size_t i = begin; i < end; i++) {
         vector x = fill(0.0f), y = x, z = x;
@@ -756,21 +1108,103 @@ static void push(const ascc_gradients *pairs, size_t begin, size_t end, const fl
         float sum[4];
         store_totals(sum, x, y, z);
         for (size_t c = 0; c < 3; c++)
-            move[c][i] = -(pressure[i] * own[c][i] + sum[c]);
+            move[i * 4 + c] = -(pressure[i] * own[c][i] + sum[c]);
+        move[i * 4 + 3] = 0.0f;
     }
 }
 
 static void divergence(const ascc_gradients *pairs, size_t begin, size_t end, float *const own[3],
-                       float *const move[3], float *change)
+                       const float *move, float *change)
 {
     for (size_t i = begin; i < end; i++) {
         vector sum = fill(0.0f);
-        for (size_t k = pairs->start[i]; k < pairs->end[i]; k += LANES)
+        for (size_t k = pairs->start[i]; k < pairs->end[i]; k += LANES) {
+            const float *from[LANES];
+            vector v[4];
+            for (size_t l = 0; l < LANES; l++)
+                from[l] = move + (size_t)pairs->neighbor[k + l] * 4;
+            load_quads(from, v);
             for (size_t c = 0; c < 3; c++)
-                sum = fused(load(pairs->g[c] + k), gather_lanes(move[c], pairs->neighbor + k), sum);
-        change[i] =
-            own[0][i] * move[0][i] + own[1][i] * move[1][i] + own[2][i] * move[2][i] - total(sum);
+                sum = fused(load(pairs->g[c] + k), v[c], sum);
+        }
+        const float *m = move + i * 4;
+        change[i] = own[0][i] * m[0] + own[1][i] * m[1] + own[2][i] * m[2] - total(sum);
     }
+}
+
+/* Turned to lie along the lines between the places: no torque about these. */
+static void turn_terms(const double *place, size_t row, const uint32_t *neighbor, size_t k,
+                       float term[3][ASCC_PAIR_BATCH + LANES])
+{
+    double line[3][ASCC_PAIR_BATCH];
+    find_lines(place, row, neighbor, k, line);
+    for (size_t i = 0; i < k; i++) {
+        const double x = line[0][i], y = line[1][i], z = line[2][i];
+        const double along =
+            x * (double)term[0][i] + y * (double)term[1][i] + z * (double)term[2][i];
+        const double square = x * x + y * y + z * z;
+        const double share = square > 0.0 ? along / square : 0.0;
+        term[0][i] = (float)(share * x);
+        term[1][i] = (float)(share * y);
+        term[2][i] = (float)(share * z);
+    }
+}
+
+/* Gradients of k pairs become what their pressures make of them. */
+static void press(const ascc_pressures *p, size_t row, const uint32_t *neighbor, size_t k,
+                  float g[3][ASCC_PAIR_BATCH + LANES])
+{
+    float *RESTRICT x = g[0], *RESTRICT y = g[1], *RESTRICT z = g[2];
+    const float most = p->limit;
+    const vector own = fill(p->pressure[row]);
+    float both[ASCC_PAIR_BATCH + LANES];
+    for (size_t i = 0; i < k; i += LANES)
+        store(both + i, minus(fill(0.0f), add(own, gather_lanes(p->pressure, neighbor + i))));
+    for (size_t i = 0; i < k; i++) {
+        const float tx = both[i] * x[i], ty = both[i] * y[i], tz = both[i] * z[i];
+        const float size = tx * tx + ty * ty + tz * tz;
+        const float share = size > most * most ? most / sqrtf(size) : 1.0f;
+        x[i] = tx * share;
+        y[i] = ty * share;
+        z[i] = tz * share;
+    }
+    if (p->place)
+        turn_terms(p->place, row, neighbor, k, g);
+}
+
+static int pressure_impulses(const ascc_gradients *pairs, const ascc_pressures *p, size_t row,
+                             double limit, int64_t *sum)
+{
+    int good = 1;
+    for (size_t k = pairs->start[row]; k < pairs->end[row]; k += ASCC_PAIR_BATCH) {
+        const size_t stop =
+            pairs->end[row] - k < ASCC_PAIR_BATCH ? pairs->end[row] : k + ASCC_PAIR_BATCH;
+        uint32_t near[ASCC_PAIR_BATCH + LANES];
+        float g[3][ASCC_PAIR_BATCH + LANES];
+        double impulse[3][ASCC_PAIR_BATCH];
+        size_t n = 0;
+        for (size_t i = k; i < stop; i += LANES) {
+            const kept after = kept_lanes(above(pairs->neighbor + i, (uint32_t)row));
+            store_kept_integers(near + n, pairs->neighbor + i, after);
+            for (size_t c = 0; c < 3; c++)
+                store_kept(g[c] + n, load(pairs->g[c] + i), after);
+            n += after.count;
+        }
+        for (size_t i = n; i % LANES; i++)
+            near[i] = (uint32_t)row;
+        press(p, row, near, n, g);
+        const double a = p->mass[p->uniform ? 0 : row];
+        for (size_t c = 0; c < 3; c++)
+            for (size_t i = 0; i < n; i++)
+                impulse[c][i] = (double)g[c][i] * p->factor * a;
+        for (size_t i = 0; !p->uniform && i < n; i++) {
+            const double b = p->mass[near[i]], mass = a == b ? a : 2.0 * (a * b) / (a + b);
+            for (size_t c = 0; c < 3; c++)
+                impulse[c][i] = (double)g[c][i] * p->factor * mass;
+        }
+        good &= add_impulses(impulse, limit, near, n, sum + row * 4, sum);
+    }
+    return good;
 }
 
 /* ---- The way back, in training ---- */
@@ -835,17 +1269,22 @@ void ASCC_VARIANT(ascc_kernels *kernels)
     kernels->search = SEARCH;
     kernels->search_cube = SEARCH_CUBE;
     kernels->geometry = geometry;
+    kernels->directions = directions;
     kernels->gather = gather;
     kernels->basis = basis;
     kernels->gather_basis = gather_basis;
-    kernels->pair_strengths = pair_strengths;
+    kernels->pair_lines = pair_lines;
     kernels->moments = moments;
     kernels->multiply = multiply;
+    kernels->multiply_blocks = multiply_blocks;
     kernels->pair_terms = pair_terms;
     kernels->pair_impulses = pair_impulses;
+    kernels->add_impulses = add_impulses;
     kernels->spline = spline;
+    kernels->keep_gradients = keep_gradients;
     kernels->push = push;
     kernels->divergence = divergence;
+    kernels->pressure_impulses = pressure_impulses;
     kernels->scatter = scatter;
     kernels->dot = dot;
 }

@@ -17,6 +17,11 @@ typedef struct ascc_coordinates {
     const int32_t *x, *y, *z;
 } ascc_coordinates;
 
+/* Points [begin, end). */
+typedef struct ascc_run {
+    size_t begin, end;
+} ascc_run;
+
 /* Geometry of neighbour pairs, one entry a pair: where the neighbour lies in the kernel's cube
  * [-1, 1]^3, and the value of each window there (by ascc_window; NULL = not wanted). Every array can
  * be read to the next multiple of 8 pairs; what lies there does not matter. */
@@ -35,22 +40,59 @@ typedef struct ascc_gradients {
     const float *weight; /* or NULL */
 } ascc_gradients;
 
+/* What pressures give pairs: see pressure_impulses. */
+typedef struct ascc_pressures {
+    const float *pressure; /* of rows */
+    float limit;
+    double factor;
+    const double *mass;  /* of rows, or of all */
+    int uniform;         /* the latter */
+    const double *place; /* [row][3] or NULL */
+} ascc_pressures;
+
+/* Pairs of one row that are evaluated together. */
+#define ASCC_PAIR_BATCH 64
+
+/* Rows whose pairs act along the lines to their neighbours: all but the rows' own coefficients. Those are of
+ * each bump strength and damping in turn, 16 numbers, zeros where there are fewer. */
+typedef struct ascc_lines {
+    const int32_t *row, *neighbor; /* places as the network sees them, [row][4] */
+    float inverse_radius;
+    size_t bumps, dimension;
+    int both; /* neighbours are rows of the same set; else they rest, and have no coefficients */
+    const float *coefficient; /* [row][16], if both */
+    /* Motions of rows, a apart: `dimension` numbers are read, but 4 loaded; NULL = no damping. */
+    const float *motion;
+    size_t a;
+    /* Of neighbours, so far apart, what strength and damping are multiplied by; NULL = 1. */
+    const float *area;
+    size_t area_stride;
+    /* [row][3], if both: between these the lines run, turned; NULL = as seen. */
+    const double *place;
+    double factor, limit;
+} ascc_lines;
+
 typedef struct ascc_kernels {
-    /* Appends to found[] those of points [begin, end) whose squared distance from (x, y, z) is at
-     * most limit (in squared units of the integers); ascending. Returns how many. found has room
-     * for end - begin + 16. */
-    size_t (*search)(const ascc_coordinates *points, size_t begin, size_t end, int32_t x, int32_t y,
-                     int32_t z, float limit, uint32_t *found);
+    /* Writes to found[] those points of some runs whose squared distance from (x, y, z) is at most limit (in
+     * squared units of the integers); in order. Returns how many. found has room for all points of the runs
+     * + 16. */
+    size_t (*search)(const ascc_coordinates *points, const ascc_run *runs, size_t count, int32_t x,
+                     int32_t y, int32_t z, float limit, uint32_t *found);
 
     /* The same of those within a cube: all of |x|, |y|, |z| times inverse below 1, the hat above 0. */
-    size_t (*search_cube)(const ascc_coordinates *points, size_t begin, size_t end, int32_t x,
-                          int32_t y, int32_t z, float inverse, uint32_t *found);
+    size_t (*search_cube)(const ascc_coordinates *points, const ascc_run *runs, size_t count,
+                          int32_t x, int32_t y, int32_t z, float inverse, uint32_t *found);
 
     /* pairs[k] of the displacements neighbour[k] - (x, y, z), scaled by inverse_radius into the unit
      * ball and mapped to the cube (or to directions). mapping is an ascc_mapping. */
     void (*geometry)(const ascc_coordinates *points, const uint32_t *neighbor, size_t k, int32_t x,
                      int32_t y, int32_t z, float inverse_radius, int mapping,
                      const ascc_pairs *pairs);
+
+    /* The same with mapping 3 of places [row][4], of which the first three count. Fills up to a multiple of 8
+     * pairs. */
+    void (*directions)(const int32_t *place, const uint32_t *neighbor, size_t k,
+                       const int32_t at[3], float inverse_radius, const ascc_pairs *pairs);
 
     /* column[c][a] = sum over k of window * trilinear weight * feature[neighbor[k]][a], neighbours in
      * order; window NULL = 1. cells: along x, y, z. column is overwritten. */
@@ -60,6 +102,11 @@ typedef struct ascc_kernels {
     /* out[n][out_stride] += in[n][a] * weight[a][b]: each output one chain of fma over ascending a. */
     void (*multiply)(const float *in, size_t in_stride, size_t n, size_t a, const float *weight,
                      size_t b, float *out, size_t out_stride);
+
+    /* The same of inputs in blocks that lie anywhere: out[n][out_stride] += in[n][block][a] *
+     * weight[block][a][b]. */
+    void (*multiply_blocks)(const float *const *in, size_t blocks, size_t n, size_t a,
+                            const float *weight, size_t b, float *out, size_t out_stride);
 
     /* factor[m * stride + j] = basis function m of pair j, m = bump * harmonics + harmonic:
      * (1 - (bumps * distance - bump)^2)^2 where that square is below 1, else 0, times a harmonic of
@@ -75,15 +122,18 @@ typedef struct ascc_kernels {
                          const uint32_t *neighbor, size_t k, const float *feature, size_t a,
                          float *column);
 
-    /* out[j] = sum over bump < bumps <= 8 of its function of the distance, as in basis, times
-     * (center[bump] + feature[neighbor[j]][bump]); rows of feature are 8 wide, the rest zeros. */
-    void (*pair_strengths)(const float *distance, const uint32_t *neighbor, size_t k,
-                           const float *center, const float *feature, size_t bumps, float *out);
+    /* impulse[c][j] = mass[j * mass_step] * share * line[c], the line from the row to neighbour j < k,
+     * share = factor * strength over the line's length, 0 without one. strength = sum over bumps of its
+     * function of the distance, as in basis, times both sides' coefficients; turned, times the cosine between the line and
+     * the displacement; less as much damping times the speed of approach; cut off at limit. */
+    void (*pair_lines)(const ascc_lines *lines, size_t row, const float own[16],
+                       const uint32_t *neighbor, size_t k, const double *mass, size_t mass_step,
+                       double impulse[3][ASCC_PAIR_BATCH]);
 
     /* sum[bump][8] = sum over the pairs j < k in order of a bump (as in basis, of the distance) times the
      * eight numbers 1, x, y, z, w, each times weight, and d[3]. fluid: d = feature[neighbor[j]] - own; wall: d =
      * feature[neighbor[j]]; w, the speed of approach, is -(d . xyz), of a wall own . xyz. One chain of
-     * fma a bump. feature rows are a >= 8 apart, of which `dimension` numbers are read (but 8 are loaded);
+     * fma a number. feature rows are a apart, of which `dimension` numbers are read (but 4 are loaded);
      * weight[neighbor[j] * stride], NULL = 1. With 2 dimensions z and d[2] are 0. */
     void (*moments)(const ascc_pairs *pairs, const uint32_t *neighbor, size_t k,
                     const float *feature, size_t a, const float own[3], int wall, size_t dimension,
@@ -104,6 +154,10 @@ typedef struct ascc_kernels {
                          size_t mass_step, double limit, const uint32_t *neighbor, size_t k,
                          int64_t own[4], int64_t *sum);
 
+    /* The same for q(j)[c], the integer nearest to impulse[c][j]; c < 3. */
+    int (*add_impulses)(double impulse[3][ASCC_PAIR_BATCH], double limit, const uint32_t *neighbor,
+                        size_t k, int64_t own[4], int64_t *sum);
+
     /* The cubic spline w = 2 (1 - q)^3 - 8 (1/2 - q)^3, no bracket below 0, of k pairs with unit vectors and
      * distances q (geometry, mapping 3), times volume, or with volumes times volumes[neighbor]: distance
      * becomes that value, x, y, z minus its slope times the unit vector. sum[8] = the sums of value, x,
@@ -111,14 +165,26 @@ typedef struct ascc_kernels {
     void (*spline)(const ascc_pairs *pairs, const uint32_t *neighbor, size_t k, float volume,
                    const float *volumes, float sum[8]);
 
-    /* Of rows [begin, end): move[c][i] = -(pressure[i] own[c][i] + sum over pairs of weight
-     * pressure[neighbor] g[c]); a pair's weight is 1 without weights. 8 partial sums by pair mod 8. */
+    /* Keeps of a row's k pairs those whose x, y, z are not all 0: in order, neighbours at `to`, filled up to a
+     * multiple of 8 with the row and zeros; returns how many that makes. Room for k, filled up likewise. */
+    size_t (*keep_gradients)(const ascc_pairs *pairs, const uint32_t *neighbor, size_t k,
+                             uint32_t row, uint32_t *to, float *const g[3]);
+
+    /* Of rows [begin, end): move[i][c] = -(pressure[i] own[c][i] + sum over pairs of weight
+     * pressure[neighbor] g[c]); a pair's weight is 1 without weights. 8 partial sums by pair mod 8.
+     * Rows of move are 4 wide. */
     void (*push)(const ascc_gradients *pairs, size_t begin, size_t end, const float *pressure,
-                 float *const own[3], float *const move[3]);
+                 float *const own[3], float *move);
 
     /* Of rows [begin, end): change[i] = own[i] . move[i] - sum over pairs of g . move[neighbor]. */
     void (*divergence)(const ascc_gradients *pairs, size_t begin, size_t end, float *const own[3],
-                       float *const move[3], float *change);
+                       const float *move, float *change);
+
+    /* Pairs of a row with neighbours after it: impulses -(both pressures) g, cut off at limit, turned into
+     * the line between their places, times factor and the masses that ascc_pair_mass makes of both. Added to the
+     * row's sums and taken from the neighbours', [row][4], as add_impulses does, with its limit of quanta. */
+    int (*pressure_impulses)(const ascc_gradients *pairs, const ascc_pressures *pressures,
+                             size_t row, double limit, int64_t *sum);
 
     /* Of the way back: gradient[neighbor[i]][a] += sum over members m of factor[m * stride + i] *
      * column[m][a], pairs in order; members come in bumps of so many harmonics, and a bump whose

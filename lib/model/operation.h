@@ -85,9 +85,14 @@ typedef struct ascc_operation {
     void (*scratch)(const ascc_plan *plan, const ascc_term *term, ascc_scratch_sizes *sizes);
     /* It reads the fluid's features besides its source. NULL = never. */
     bool (*reads_features)(const ascc_term *term);
+    /* It can read its rows from a tile, ascc_tile.given, before their value is stored. */
+    bool reads_tiles;
 
     /* ---- Running ---- */
 
+    /* Makes what its forward and backward read besides, once a step; what terms share by their first list goes to
+     * run->table. errors: MEMORY. NULL = nothing. */
+    ascc_status (*prepare)(const struct ascc_network_run *run, const ascc_term *term);
     /* Adds to the tile's rows. */
     void (*forward)(const struct ascc_tile *tile, const ascc_term *term);
     /* The columns of the tile's rows that its matrix multiplies, one after another in tile->column; returns how

@@ -308,9 +308,12 @@ ascc_status ascc_network_demand(ascc_network_run *run, const ascc_network *netwo
     run->tools = tools;
     run->value = ascc_arena_take(tools->arena, (size_t)network->value_count, sizeof *run->value);
     run->rows = ascc_arena_take(tools->arena, (size_t)network->key_count, sizeof *run->rows);
-    if (!run->value || !run->rows)
+    run->table = ascc_arena_take(tools->arena, (size_t)network->key_count, sizeof *run->table);
+    if (!run->value || !run->rows || !run->table)
         return ascc_fail(tools->message, ASCC_ERROR_MEMORY, "no memory for the network");
     memset(run->value, 0, (size_t)network->value_count * sizeof *run->value);
+    for (int32_t k = 0; k < network->key_count; k++)
+        run->table[k] = NULL;
     if (!take_active(run))
         return ascc_fail(tools->message, ASCC_ERROR_MEMORY, "no memory for the network");
     ascc_status status = open_rows(run, expected);

@@ -1,17 +1,21 @@
-/* Layer by layer: what the rows that are needed are worth. SPDX-License-Identifier: MIT */
+/* Layer by layer: what the rows that are needed are worth. SPDX-License-Identifier: MIT
+ *
+ * A value that only first terms read, each row its own, is passed on tile by tile and never stored: moments,
+ * with hundreds of channels, leave but what dense layers make of them.
+ */
 #include <math.h>
 #include <string.h>
 
 #include "network.h"
 
 typedef struct layer_job {
-    const ascc_network_run *run;
+    ascc_network_run *run;
     const ascc_layer *layer;
-    ascc_value *value;
+    ascc_value *value;    /* NULL: passed on */
     size_t width;         /* of a tile's row: what any term may write */
     const uint32_t *list; /* active rows */
     float *scratch; /* [slots][scratch_size]: columns, a tile of the layer, scratch of terms */
-    size_t scratch_size, tile_offset, term_offset;
+    size_t scratch_size, tile_offset, next_offset, term_offset;
     ascc_scratch_sizes sizes;
     uint32_t *sequence; /* 0, 1, 2, ... */
 } layer_job;
@@ -44,6 +48,95 @@ static void store_row(const ascc_value *value, size_t row, const float *from, in
     }
 }
 
+/* ---- Values that are passed on ---- */
+
+static const ascc_term *first_term(const ascc_plan *plan, int32_t l)
+{
+    return &plan->term[plan->layer[l].first_term];
+}
+
+/* Does layer m read that of layer l tile by tile? */
+static bool reads_tiles(const ascc_plan *plan, int32_t m, int32_t l)
+{
+    const ascc_term *term = first_term(plan, m);
+    return term->source == l + 2 && term->operation->reads_tiles && !term->rectify &&
+           plan->layer[m].set == plan->layer[l].set;
+}
+
+bool ascc_network_passes_on(const ascc_network *network, int32_t l)
+{
+    const ascc_plan *plan = network->plan;
+    bool read = false;
+    if (network->keeps_values || plan->output.term.source == l + 2 ||
+        plan->relaxation.guess == l + 2)
+        return false;
+    for (int32_t m = l + 1; m < plan->layer_count; m++)
+        for (int32_t t = 0; t < plan->layer[m].term_count; t++)
+            if (plan->term[plan->layer[m].first_term + t].source == l + 2) {
+                if (t > 0 || !reads_tiles(plan, m, l))
+                    return false;
+                read = true;
+            }
+    return read;
+}
+
+/* The first term of layer m was computed with its source. */
+static bool is_begun(const ascc_network *network, int32_t m)
+{
+    const int32_t l = first_term(network->plan, m)->source - 2;
+    return l >= 0 && ascc_network_passes_on(network, l);
+}
+
+/* Where a row waits for the other terms of its layer. */
+static float *begun_row(const ascc_value *value, size_t row, int32_t channels)
+{
+    return (value->raw ? value->raw : value->rectified) + row * ascc_padded(channels);
+}
+
+/* Gives the rows of a tile to all who read them. */
+static void pass_on(const layer_job *job, const ascc_tile *from, float *sum)
+{
+    const ascc_plan *plan = job->run->plan;
+    const int32_t l = (int32_t)(job->layer - plan->layer);
+    for (int32_t m = l + 1; m < plan->layer_count; m++) {
+        if (!reads_tiles(plan, m, l))
+            continue;
+        const ascc_layer *layer = &plan->layer[m];
+        ascc_value *value = &job->run->value[m + 2];
+        ascc_tile tile = *from;
+        tile.layer = layer;
+        tile.sum = sum;
+        tile.width = ascc_padded(layer->channels) + 8;
+        tile.given = from->sum;
+        tile.given_width = from->width;
+        memset(sum, 0, tile.n * tile.width * sizeof *sum);
+        first_term(plan, m)->operation->forward(&tile, first_term(plan, m));
+        for (size_t r = 0; r < tile.n; r++) {
+            const float *row = sum + r * tile.width;
+            if (layer->term_count == 1)
+                store_row(value, tile.list[r], row, layer->channels);
+            else
+                memcpy(begun_row(value, tile.list[r], layer->channels), row,
+                       (size_t)layer->channels * sizeof *row);
+        }
+    }
+}
+
+/* ---- Layers ---- */
+
+/* What the tile's rows begin with: 0, or what they were given. Returns the number of the next term. */
+static int32_t begin_tile(const layer_job *job, const ascc_tile *tile)
+{
+    const ascc_layer *layer = job->layer;
+    memset(tile->sum, 0, tile->n * tile->width * sizeof *tile->sum);
+    if (!is_begun(job->run->network, (int32_t)(layer - job->run->plan->layer)))
+        return 0;
+    for (size_t r = 0; r < tile->n; r++)
+        memcpy(tile->sum + r * tile->width, begun_row(job->value, tile->list[r], layer->channels),
+               (size_t)layer->channels * sizeof *tile->sum);
+    return 1;
+}
+
 static void compute_tiles(void *data, size_t begin, size_t end, int32_t slot)
 {
     const layer_job *job = data;
@@ -59,12 +152,13 @@ static void compute_tiles(void *data, size_t begin, size_t end, int32_t slot)
     for (size_t at = begin; at < end; at += ASCC_TILE_ROWS) {
         tile.n = ascc_min_size(ASCC_TILE_ROWS, end - at);
         tile.list = job->list + at;
-        memset(tile.sum, 0, tile.n * job->width * sizeof *tile.sum);
-        for (int32_t t = 0; t < job->layer->term_count; t++) {
+        for (int32_t t = begin_tile(job, &tile); t < job->layer->term_count; t++) {
             const ascc_term *term = &job->run->plan->term[job->layer->first_term + t];
             term->operation->forward(&tile, term);
         }
-        for (size_t r = 0; r < tile.n; r++)
+        if (!job->value)
+            pass_on(job, &tile, scratch + job->next_offset);
+        for (size_t r = 0; job->value && r < tile.n; r++)
             store_row(job->value, tile.list[r], tile.sum + r * job->width, job->layer->channels);
     }
 }
@@ -146,23 +240,62 @@ static size_t list_active(const ascc_search_tools *tools, const uint8_t *active,
     return count;
 }
 
+/* Room for the layer's value, or for those of all who are given it; the widest of these. */
+static bool take_values(ascc_network_run *run, int32_t l, bool passed_on, size_t *width)
+{
+    const ascc_plan *plan = run->plan;
+    *width = 0;
+    if (!passed_on)
+        return is_begun(run->network, l) || take_value(run, l + 2);
+    for (int32_t m = l + 1; m < plan->layer_count; m++)
+        if (reads_tiles(plan, m, l)) {
+            *width = ascc_max_size(*width, ascc_padded(plan->layer[m].channels) + 8);
+            if (!take_value(run, m + 2))
+                return false;
+        }
+    return true;
+}
+
+/* What the terms of a layer want made first. */
+static ascc_status prepare_terms(const ascc_network_run *run, const ascc_layer *layer)
+{
+    ascc_status status = ASCC_OK;
+    for (int32_t t = 0; t < layer->term_count && status == ASCC_OK; t++) {
+        const ascc_term *term = &run->plan->term[layer->first_term + t];
+        if (term->operation->prepare)
+            status = term->operation->prepare(run, term);
+    }
+    return status;
+}
+
 static ascc_status compute_layer(ascc_network_run *run, int32_t l, uint32_t *list)
 {
     const ascc_layer *layer = &run->plan->layer[l];
     const ascc_search_tools *tools = run->tools;
-    layer_job job = {.run = run, .layer = layer, .value = &run->value[l + 2], .list = list};
+    const bool passed_on = ascc_network_passes_on(run->network, l);
+    layer_job job = {.run = run, .layer = layer, .list = list};
+    job.value = passed_on ? NULL : &run->value[l + 2];
     const size_t slots = (size_t)ascc_workers_count(tools->workers);
+    size_t next_width;
+    if (is_begun(run->network, l) && layer->term_count == 1)
+        return ASCC_OK;
+    const ascc_status status = prepare_terms(run, layer);
+    if (status != ASCC_OK)
+        return status;
+    if (!take_values(run, l, passed_on, &next_width))
+        return ascc_fail(tools->message, ASCC_ERROR_MEMORY, "no memory for layer %s", layer->name);
     job.sizes = ascc_network_sizes(run, layer);
     job.width = ascc_padded(layer->channels) + 8;
     job.tile_offset = ASCC_TILE_ROWS * (job.sizes.column + ASCC_COLUMN_PADDING);
-    job.term_offset = job.tile_offset + ASCC_TILE_ROWS * job.width;
+    job.next_offset = job.tile_offset + ASCC_TILE_ROWS * job.width;
+    job.term_offset = job.next_offset + ASCC_TILE_ROWS * next_width;
     job.scratch_size = job.term_offset + job.sizes.scratch;
     const ascc_arena_mark mark = ascc_arena_mark_of(tools->arena);
     job.sequence = ascc_arena_lend(tools->arena, job.sizes.room, sizeof *job.sequence);
     for (size_t i = 0; job.sequence && i < job.sizes.room; i++)
         job.sequence[i] = (uint32_t)i;
     job.scratch = ascc_arena_lend(tools->arena, slots * job.scratch_size, sizeof(float));
-    if (!job.scratch || !job.sequence || !take_value(run, l + 2))
+    if (!job.scratch || !job.sequence)
         return ascc_fail(tools->message, ASCC_ERROR_MEMORY, "no memory for layer %s", layer->name);
     const size_t count =
         list_active(tools, run->value[l + 2].active, run->hierarchy->set[layer->set].count, list);

@@ -162,6 +162,8 @@ static void split(void *data, size_t begin, size_t end, int32_t slot)
         const int64_t at[3] = {all->position[0][i], all->position[1][i], all->position[2][i]};
         h->part[i] = (uint32_t)next[s];
         h->whole[s][next[s]] = (uint32_t)i;
+        for (size_t c = 0; c < 4; c++)
+            h->place[s][next[s] * 4 + c] = c < 3 ? (int32_t)(uint32_t)(uint64_t)at[c] : 0;
         ascc_points_set(&h->set[s], next[s]++, at);
     }
 }
@@ -174,7 +176,9 @@ static bool take_sets(ascc_hierarchy *h, ascc_arena *arena, size_t boundary_coun
     h->part = ascc_arena_take(arena, count, sizeof *h->part);
     h->whole[0] = ascc_arena_take(arena, h->fluid_count, sizeof(uint32_t));
     h->whole[1] = ascc_arena_take(arena, boundary_count, sizeof(uint32_t));
-    return h->origin && h->part && h->whole[0] && h->whole[1] &&
+    h->place[0] = ascc_arena_take(arena, h->fluid_count, 4 * sizeof(int32_t));
+    h->place[1] = ascc_arena_take(arena, boundary_count, 4 * sizeof(int32_t));
+    return h->origin && h->part && h->whole[0] && h->whole[1] && h->place[0] && h->place[1] &&
            ascc_points_take(&h->set[ASCC_SET_ALL], arena, count) &&
            ascc_points_take(&h->set[ASCC_SET_FLUID], arena, h->fluid_count) &&
            ascc_points_take(&h->set[ASCC_SET_BOUNDARY], arena, boundary_count);

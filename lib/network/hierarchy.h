@@ -16,6 +16,7 @@ typedef struct ascc_hierarchy {
     uint32_t *origin;   /* the host's row: fluid row, or fluid_count + boundary row */
     uint32_t *part;     /* the row in ASCC_SET_FLUID or ASCC_SET_BOUNDARY */
     uint32_t *whole[2]; /* and back: [set row] of fluid, boundary */
+    int32_t *place[2];  /* low words of fluid, boundary once more: [set row][4], the last 0 */
     ascc_extent extent; /* of all sets */
     double base_radius; /* units: level 0 is in the order of cells for it */
     int grid_count;

@@ -27,6 +27,7 @@ typedef struct ascc_network {
     int32_t relaxation_key[2]; /* fluid and walls around the fluid; -1 = there is no relaxation */
     uint8_t *wants;            /* [value_count] ASCC_WANTS_* */
     int32_t max_neighbors;     /* of a point, before LIMIT */
+    bool keeps_values;         /* also those that readers are given tile by tile: for a way back */
 } ascc_network;
 
 ascc_status ascc_network_create(ascc_network *network, const ascc_allocator *allocator,
@@ -57,7 +58,8 @@ typedef struct ascc_network_run {
     ascc_hierarchy *hierarchy;
     const ascc_search_tools *tools;
     ascc_value *value;
-    ascc_rows *rows; /* [key_count] */
+    ascc_rows *rows;  /* [key_count] */
+    uint32_t **table; /* [key_count] what operations make of a list, else NULL */
     size_t neighbor_count;
     uint32_t longest;
 } ascc_network_run;
@@ -72,6 +74,9 @@ ascc_status ascc_network_demand(ascc_network_run *run, const ascc_network *netwo
  * errors: MEMORY. */
 ascc_status ascc_network_forward(ascc_network_run *run, const float *fluid_features,
                                  const float *boundary_features);
+
+/* Is the value of a layer given to its readers tile by tile, and never stored? */
+bool ascc_network_passes_on(const ascc_network *network, int32_t layer);
 
 /* ---- What operations read ---- */
 
@@ -91,6 +96,9 @@ typedef struct ascc_tile {
     float *scratch; /* as the operation asked for */
     size_t room;
     const uint32_t *sequence; /* 0, 1, 2, ... [room] */
+    const float
+        *given; /* rows of the source as they come, given_width apart; NULL = from its value */
+    size_t given_width;
 } ascc_tile;
 
 /* The value that a term reads, rectified if it wants that. */

@@ -58,19 +58,58 @@ static size_t columns(const ascc_tile *tile, const ascc_term *term)
     return count;
 }
 
+static bool all_zero(const float from[8])
+{
+    uint64_t bits[4];
+    memcpy(bits, from, sizeof bits);
+    return !(bits[0] | bits[1] | bits[2] | bits[3]);
+}
+
+/* Inputs up to the last that is not 0 in all n rows: away from walls half of all moments are. */
+static size_t used_inputs(const float *in, size_t stride, size_t n, size_t a)
+{
+    size_t used = 8;
+    for (size_t r = 0; r < n && used < a; r++) {
+        size_t end = a;
+        while (end > used && all_zero(in + r * stride + end - 8))
+            end -= 8;
+        used = end;
+    }
+    return used;
+}
+
+/* n rows of the tile from r on, whose inputs follow one another. */
+static void multiply_rows(const ascc_tile *tile, const ascc_term *term, size_t r, size_t n,
+                          const float *in, size_t stride)
+{
+    float *to = tile->sum + r * tile->width + term->column;
+    for (size_t i = 0; i < n; i++)
+        ascc_matrix_add_bias(tile->run, term, to + i * tile->width);
+    tile->run->tools->kernels->multiply(
+        in, stride, n, used_inputs(in, stride, n, ascc_padded(term->inputs)),
+        ascc_term_packed(tile->run, term), ascc_padded(term->outputs), to, tile->width);
+}
+
 static void forward(const ascc_tile *tile, const ascc_term *term)
 {
     const ascc_network_run *run = tile->run;
     const int32_t set = ascc_network_set(run->network, term->source);
     const size_t a = ascc_padded(term->inputs);
     const float *source = ascc_term_source(run, term);
-    for (size_t r = 0, j; r < tile->n; r++) {
+    if (tile->given) {
+        multiply_rows(tile, term, 0, tile->n, tile->given, tile->given_width);
+        return;
+    }
+    for (size_t r = 0, n, j, next; r < tile->n; r += n) {
+        n = 1;
         if (!ascc_network_shared_row(run->hierarchy, tile->layer->set, set, tile->list[r], &j))
             continue;
-        float *row = tile->sum + r * tile->width + term->column;
-        ascc_matrix_add_bias(run, term, row);
-        run->tools->kernels->multiply(source + j * a, a, 1, a, ascc_term_packed(run, term),
-                                      ascc_padded(term->outputs), row, tile->width);
+        while (r + n < tile->n &&
+               ascc_network_shared_row(run->hierarchy, tile->layer->set, set, tile->list[r + n],
+                                       &next) &&
+               next == j + n)
+            n++;
+        multiply_rows(tile, term, r, n, source + j * a, a);
     }
 }
 
@@ -108,6 +147,7 @@ const ascc_operation ascc_op_dense = {.name = "dense",
                                       .transpose = ascc_matrix_transpose,
                                       .cost = cost,
                                       .scratch = scratch,
+                                      .reads_tiles = true,
                                       .columns = columns,
                                       .forward = forward,
                                       .backward = backward};

@@ -146,32 +146,41 @@ static void sum_row(const ascc_tile *tile, const ascc_term *term, int list, size
     const float *vectors = vectors_of(run, list, &stride);
     const float *motion = vectors_of(run, 0, &own_stride) + row * own_stride;
     const float own[3] = {motion[0], motion[1], d > 2 ? motion[2] : 0.0f};
-    ascc_geometry g;
-    ascc_geometry_of(&g, run, rows, &filter, row, neighbor, count, tile->scratch, tile->room);
-    run->tools->kernels->moments(&g.pairs, neighbor, count, vectors, stride, own, list, d,
+    float *scratch = tile->scratch;
+    const ascc_pairs pairs = {.x = scratch,
+                              .y = scratch + tile->room,
+                              .z = scratch + 2 * tile->room,
+                              .distance = scratch + 3 * tile->room};
+    run->tools->kernels->directions(run->hierarchy->place[list], neighbor, count,
+                                    run->hierarchy->place[0] + row * 4, (float)(1.0 / rows->radius),
+                                    &pairs);
+    run->tools->kernels->moments(&pairs, neighbor, count, vectors, stride, own, list, d,
                                  areas_of(run, list), stride, (size_t)filter.bumps, sum);
 }
 
-/* The numbers of a bump without those that a plane does not have. */
-static float *write_bump(const float from[8], int32_t dimension, float *to)
+/* The numbers of bumps, in a plane without those that it does not have. */
+static void add_bumps(const float *restrict from, int32_t bumps, int32_t dimension,
+                      float *restrict to)
 {
-    for (int n = 0; n < 8; n++)
-        if (dimension == 3 || (n != 3 && n != 7))
+    for (int32_t n = 0; dimension == 3 && n < 8 * bumps; n++)
+        to[n] += from[n];
+    for (int32_t n = 0; dimension < 3 && n < 8 * bumps; n++)
+        if (n % 8 != 3 && n % 8 != 7)
             *to++ += from[n];
-    return to;
 }
 
 static void forward(const ascc_tile *tile, const ascc_term *term)
 {
-    const int32_t dimension = tile->run->plan->dimension;
+    const ascc_plan *plan = tile->run->plan;
     for (size_t r = 0; r < tile->n; r++) {
-        float *to = tile->sum + r * tile->width + term->column;
+        float *to = tile->sum + r * tile->width + term->column, sum[ASCC_MAX_BUMPS * 8];
         for (int list = 0; list < (wall_bumps(term) ? 2 : 1); list++) {
-            float sum[ASCC_MAX_BUMPS * 8];
             const int32_t bumps = list ? wall_bumps(term) : term->filter.bumps;
-            sum_row(tile, term, list, tile->list[r], sum);
-            for (int32_t b = 0; b < bumps; b++)
-                to = write_bump(sum + b * 8, dimension, to);
+            if (ascc_term_list(tile->run, term, list)->count[tile->list[r]]) { /* mostly no walls */
+                sum_row(tile, term, list, tile->list[r], sum);
+                add_bumps(sum, bumps, plan->dimension, to);
+            }
+            to += bumps * numbers(plan);
         }
     }
 }

@@ -3,7 +3,7 @@
  *
  * The strength of a pair is linear in what the two particles hold, so each particle is multiplied with the
  * weights of all radial basis functions (`bumps`) once, and a pair costs the two that reach it.
- * Packed: a part for each tensor, [padded inputs][8 bumps].
+ * Packed: of fluid pairs, then of walls [padded inputs][16]: strength and damping of each bump in turn.
  */
 #include <math.h>
 #include <string.h>
@@ -15,8 +15,16 @@
 #include "pair_reverse.h"
 #include "pair_sum.h"
 
-/* The parts are the tensors: strengths and dampings of fluid pairs and of walls. */
+/* The parts are the tensors: strengths and dampings of fluid pairs and of walls; two make a side. */
 #define PARTS ASCC_MAX_TENSORS
+enum { FLUID = 0, WALLS = 1, SIDES = 2 };
+/* Coefficients of a row and side, and where a part has that of a bump. */
+#define WIDTH (2 * ASCC_MAX_BUMPS)
+
+static size_t place_of(int part, size_t bump)
+{
+    return 2 * bump + (size_t)(part % 2);
+}
 
 static const ascc_filter *filter_of(const ascc_output *output, int part)
 {
@@ -123,25 +131,26 @@ static int lists(const ascc_plan *plan, const ascc_term *term, int32_t set,
 
 /* ---- Weights ---- */
 
-static size_t part_size(const ascc_term *term)
+static size_t side_size(const ascc_term *term)
 {
-    return ascc_padded(term->inputs) * ASCC_MAX_BUMPS;
+    return ascc_padded(term->inputs) * WIDTH;
 }
 
 static size_t packed_size(const ascc_plan *plan, const ascc_term *term)
 {
     (void)plan;
-    return PARTS * part_size(term);
+    return SIDES * side_size(term);
 }
 
 static void pack(const ascc_plan *plan, const ascc_term *term, float *packed)
 {
     const size_t a = (size_t)term->inputs;
-    for (int part = 0; part < PARTS; part++, packed += part_size(term)) {
+    for (int part = 0; part < PARTS; part++) {
         const float *from = term->tensor[part];
-        for (int32_t k = 0; from && k < filter_of(&plan->output, part)->bumps; k++)
+        float *to = packed + (size_t)(part / 2) * side_size(term);
+        for (size_t k = 0; from && k < (size_t)filter_of(&plan->output, part)->bumps; k++)
             for (size_t i = 0; i < a; i++)
-                packed[i * ASCC_MAX_BUMPS + (size_t)k] = from[(size_t)k * a + i];
+                to[i * WIDTH + place_of(part, k)] = from[k * a + i];
     }
 }
 
@@ -149,19 +158,20 @@ static void unpack(const ascc_plan *plan, const ascc_term *term, const float *pa
                    float *const gradient[ASCC_MAX_TENSORS])
 {
     const size_t a = (size_t)term->inputs;
-    for (int part = 0; part < PARTS; part++, packed += part_size(term)) {
+    for (int part = 0; part < PARTS; part++) {
+        const float *from = packed + (size_t)(part / 2) * side_size(term);
         float *to = gradient[part];
-        for (int32_t k = 0; to && k < filter_of(&plan->output, part)->bumps; k++)
+        for (size_t k = 0; to && k < (size_t)filter_of(&plan->output, part)->bumps; k++)
             for (size_t i = 0; i < a; i++)
-                to[(size_t)k * a + i] += packed[i * ASCC_MAX_BUMPS + (size_t)k];
+                to[k * a + i] += from[i * WIDTH + place_of(part, k)];
     }
 }
 
 static void transpose(const ascc_plan *plan, const ascc_term *term, const float *packed, float *to)
 {
     (void)plan;
-    for (int part = 0; part < PARTS; part++, packed += part_size(term), to += part_size(term))
-        ascc_transpose(packed, ascc_padded(term->inputs), ASCC_MAX_BUMPS, to);
+    for (int side = 0; side < SIDES; side++, packed += side_size(term), to += side_size(term))
+        ascc_transpose(packed, ascc_padded(term->inputs), WIDTH, to);
 }
 
 static double cost(const ascc_plan *plan, const ascc_cost_counts *counts, int32_t set,
@@ -180,9 +190,8 @@ static bool is_damped(const ascc_term *term)
 
 static void scratch(const ascc_plan *plan, const ascc_term *term, ascc_scratch_sizes *sizes)
 {
-    sizes->column = (size_t)plan->dimension * sizeof(int64_t);
-    for (int part = 0; part < PARTS; part++)
-        sizes->column += term->tensor[part] ? ASCC_MAX_BUMPS * sizeof(float) : 0;
+    (void)term;
+    sizes->column = 4 * sizeof(int64_t) + WIDTH * sizeof(float);
     if (plan->output.current_direction)
         sizes->column += 3 * sizeof(double);
 }
@@ -192,46 +201,58 @@ static void scratch(const ascc_plan *plan, const ascc_term *term, ascc_scratch_s
 typedef struct coefficients {
     const ascc_network_run *run;
     const ascc_impulse_scale *scale;
-    float *part[PARTS];  /* [set rows][8], NULL = not there */
+    const int32_t *seen; /* [set rows][4] where the network sees them */
+    float *side[SIDES];  /* [set rows][WIDTH], NULL = not kept */
     const double *place; /* [set rows][3] positions that directions come from, else NULL */
 } coefficients;
 
-/* Of the rows that are active, stretch by stretch. */
+static bool has_side(const ascc_term *term, int side)
+{
+    return term->tensor[2 * side] || term->tensor[2 * side + 1];
+}
+
+/* Coefficients of n rows from i on. */
+static void multiply_rows(const ascc_network_run *run, int side, size_t i, size_t n, float *to)
+{
+    const ascc_term *term = &run->plan->output.term;
+    const size_t a = ascc_padded(term->inputs);
+    memset(to, 0, n * WIDTH * sizeof *to);
+    run->tools->kernels->multiply(ascc_term_source(run, term) + i * a, a, n, a,
+                                  ascc_term_packed(run, term) + (size_t)side * side_size(term),
+                                  WIDTH, to, WIDTH);
+}
+
+/* Of the rows that are active, stretch by stretch; 0 of the others. */
 static void compute_coefficients(void *data, size_t begin, size_t end, int32_t slot)
 {
     (void)slot;
     const coefficients *job = data;
-    const ascc_term *term = &job->run->plan->output.term;
-    const size_t a = ascc_padded(term->inputs);
-    const uint8_t *active = job->run->value[term->source].active;
-    const float *value = ascc_term_source(job->run, term);
-    const float *packed = ascc_term_packed(job->run, term);
+    const uint8_t *active = job->run->value[job->run->plan->output.term.source].active;
     for (size_t i = begin, stop; i < end; i = stop) {
         for (stop = i + 1; stop < end && active[i] && active[stop];)
             stop++;
-        for (int part = 0; part < PARTS; part++) {
-            float *to = job->part[part] ? job->part[part] + i * ASCC_MAX_BUMPS : NULL;
-            if (to)
-                memset(to, 0, (stop - i) * ASCC_MAX_BUMPS * sizeof *to);
+        for (int side = 0; side < SIDES; side++) {
+            float *to = job->side[side] ? job->side[side] + i * WIDTH : NULL;
             if (to && active[i])
-                job->run->tools->kernels->multiply(value + i * a, a, stop - i, a,
-                                                   packed + (size_t)part * part_size(term),
-                                                   ASCC_MAX_BUMPS, to, ASCC_MAX_BUMPS);
+                multiply_rows(job->run, side, i, stop - i, to);
+            else if (to)
+                memset(to, 0, WIDTH * sizeof *to);
         }
     }
 }
 
-/* take: ascc_arena_take or ascc_arena_lend. */
-static bool find_coefficients(coefficients *c, const ascc_network_run *run, ascc_arena *arena,
-                              void *(*take)(ascc_arena *, size_t, size_t))
+/* Those of `sides`. take: ascc_arena_take or ascc_arena_lend. */
+static bool find_coefficients(coefficients *c, const ascc_network_run *run, int sides,
+                              ascc_arena *arena, void *(*take)(ascc_arena *, size_t, size_t))
 {
     const ascc_term *term = &run->plan->output.term;
     const size_t count = run->hierarchy->set[ascc_network_set(run->network, term->source)].count;
     c->run = run;
-    for (int part = 0; part < PARTS; part++) {
-        c->part[part] =
-            term->tensor[part] ? take(arena, count, ASCC_MAX_BUMPS * sizeof(float)) : NULL;
-        if (term->tensor[part] && !c->part[part])
+    for (int side = 0; side < sides; side++) {
+        if (!has_side(term, side))
+            continue;
+        c->side[side] = take(arena, count, WIDTH * sizeof(float));
+        if (!c->side[side])
             return false;
     }
     ascc_workers_run(run->tools->workers, count, 1024, compute_coefficients, c);
@@ -253,88 +274,20 @@ static bool find_places(coefficients *c, const ascc_pair_sum *sum)
     return place != NULL;
 }
 
+/* Where the network sees the rows of the set; NULL without memory. */
+static const int32_t *find_seen(const ascc_network_run *run, int32_t set)
+{
+    const ascc_points *points = &run->hierarchy->set[set];
+    if (set <= ASCC_SET_BOUNDARY)
+        return run->hierarchy->place[set];
+    int32_t *seen = ascc_arena_lend(run->tools->arena, points->count, 4 * sizeof *seen);
+    for (size_t i = 0; seen && i < points->count; i++)
+        for (size_t c = 0; c < 4; c++)
+            seen[i * 4 + c] = c < 3 ? points->low[c][i] : 0;
+    return seen;
+}
+
 /* ---- Pairs ---- */
-
-/* What the radial basis makes of a pair. */
-typedef struct strengths {
-    float strength[ASCC_PAIR_BATCH]; /* along the line from the row to the neighbour */
-    float damping[ASCC_PAIR_BATCH];
-} strengths;
-
-/* Scales by the cosine between the displacement before the step, d of these squares, and the one that the
- * network sees. */
-static void turn_strengths(const ascc_pair_sum *sum, size_t i, const ascc_pair_batch *b,
-                           ascc_pair_impulses d, const double square[ASCC_PAIR_BATCH],
-                           float *strength)
-{
-    double seen[3][ASCC_PAIR_BATCH], seen_square[ASCC_PAIR_BATCH];
-    ascc_pair_displacements(sum->rows, NULL, i, b, seen, seen_square);
-    for (size_t k = 0; k < b->count; k++) {
-        const double lengths = sqrt(seen_square[k] * square[k]);
-        const double along = d[0][k] * seen[0][k] + d[1][k] * seen[1][k] + d[2][k] * seen[2][k];
-        strength[k] *= lengths > 0.0 ? (float)(along / lengths) : 0.0f;
-    }
-}
-
-/* Turns pair strengths into vectors along the displacements t, of these squares: subtracts damping times
- * approach speed, clamps. Coincident pairs give 0. fluid: both move; walls have no velocity. */
-static void point_strengths(const ascc_pair_sum *sum, size_t i, const ascc_pair_batch *b,
-                            const strengths *s, bool damped, bool fluid,
-                            const double square[ASCC_PAIR_BATCH], ascc_pair_impulses t)
-{
-    const ascc_plan *plan = sum->run->plan;
-    const coefficients *c = sum->data;
-    const int32_t d = plan->dimension;
-    const double factor = c->scale->factor[0], limit = ascc_output_limit(&plan->output);
-    const size_t width = ascc_padded(plan->fluid_channels);
-    const float *motion = damped ? sum->run->value[0].raw + ascc_plan_motion(plan, 0) : NULL;
-    const float *own = damped ? motion + i * width : NULL;
-    for (size_t k = 0; k < b->count; k++) {
-        const double length = sqrt(square[k]), inverse = length > 0.0 ? 1.0 / length : 0.0;
-        double strength = (double)s->strength[k];
-        if (damped) {
-            const float *other = fluid ? motion + b->neighbor[k] * width : NULL;
-            double approach = 0.0;
-            for (int32_t n = 0; n < d; n++)
-                approach += ((double)own[n] - (other ? (double)other[n] : 0.0)) * t[n][k];
-            strength -= (double)s->damping[k] * (approach * inverse);
-        }
-        strength = strength > limit ? limit : strength < -limit ? -limit : strength;
-        const double share = strength * factor * inverse;
-        for (int n = 0; n < 3; n++)
-            t[n][k] *= share;
-    }
-}
-
-static void evaluate(ascc_pair_sum *sum, size_t i, ascc_pair_batch *b)
-{
-    const ascc_network_run *run = sum->run;
-    const coefficients *c = sum->data;
-    const ascc_filter *filter = &run->plan->output.term.filter;
-    float geometry[ASCC_GEOMETRY_ARRAYS * ASCC_PAIR_BATCH];
-    double t[3][ASCC_PAIR_BATCH], square[ASCC_PAIR_BATCH];
-    strengths s;
-    size_t count = b->count;
-    for (; count % 8; count++)
-        b->neighbor[count] = b->neighbor[0];
-    ascc_geometry g;
-    ascc_geometry_of(&g, run, sum->rows, filter, i, b->neighbor, count, geometry, ASCC_PAIR_BATCH);
-    for (int part = ASCC_TENSOR_STRENGTH; part <= ASCC_TENSOR_DAMPING; part++)
-        if (c->part[part])
-            run->tools->kernels->pair_strengths(
-                g.pairs.distance, b->neighbor, b->count, c->part[part] + i * ASCC_MAX_BUMPS,
-                c->part[part], (size_t)filter->bumps,
-                part == ASCC_TENSOR_STRENGTH ? s.strength : s.damping);
-    ascc_pair_displacements(sum->rows, c->place, i, b, t, square);
-    if (c->place)
-        turn_strengths(sum, i, b, t, square, s.strength);
-    point_strengths(sum, i, b, &s, c->part[ASCC_TENSOR_DAMPING] != NULL, true, square, t);
-    for (int n = 0; n < 3; n++)
-        for (size_t k = 0; k < b->count; k++)
-            t[n][k] *= sum->uniform ? sum->mass[i]
-                                    : ascc_pair_mass(sum->mass[i], sum->mass[b->neighbor[k]]);
-    ascc_pair_sum_add(sum, i, b, t);
-}
 
 /* Areas of walls, so far apart, in the order of their set; NULL: each counts once. */
 static const float *areas_of(const ascc_network_run *run, size_t *stride)
@@ -344,41 +297,56 @@ static const float *areas_of(const ascc_network_run *run, size_t *stride)
     return channel >= 0 ? run->value[1].raw + channel : NULL;
 }
 
-static void weigh_walls(const ascc_network_run *run, const ascc_pair_batch *b, strengths *s)
+/* What pairs of a side read. */
+static ascc_lines lines_of(const coefficients *c, int side)
 {
-    size_t stride;
-    const float *area = areas_of(run, &stride);
-    for (size_t k = 0; area && k < b->count; k++) {
-        s->strength[k] *= area[b->neighbor[k] * stride];
-        s->damping[k] *= area[b->neighbor[k] * stride];
+    const ascc_plan *plan = c->run->plan;
+    const ascc_term *term = &plan->output.term;
+    const ascc_rows *rows = ascc_term_list(c->run, term, side);
+    ascc_lines l = {.row = c->seen,
+                    .neighbor =
+                        side == FLUID ? c->seen : c->run->hierarchy->place[ASCC_SET_BOUNDARY],
+                    .inverse_radius = (float)(1.0 / rows->radius),
+                    .bumps = (size_t)filter_of(&plan->output, 2 * side)->bumps,
+                    .dimension = (size_t)plan->dimension,
+                    .both = side == FLUID,
+                    .coefficient = c->side[side],
+                    .place = side == FLUID ? c->place : NULL,
+                    .factor = c->scale->factor[0],
+                    .limit = ascc_output_limit(&plan->output)};
+    if (side == WALLS)
+        l.area = areas_of(c->run, &l.area_stride);
+    if (term->tensor[2 * side + 1]) {
+        l.a = ascc_padded(plan->fluid_channels);
+        l.motion = c->run->value[0].raw + ascc_plan_motion(plan, 0);
     }
+    return l;
+}
+
+static void evaluate(ascc_pair_sum *sum, size_t i, ascc_pair_batch *b)
+{
+    const ascc_kernels *kernels = sum->run->tools->kernels;
+    const ascc_lines *lines = sum->data;
+    ascc_pair_impulses impulse;
+    double mass[ASCC_PAIR_BATCH];
+    mass[0] = sum->mass[i];
+    for (size_t k = 0; k < b->count && !sum->uniform; k++)
+        mass[k] = ascc_pair_mass(sum->mass[i], sum->mass[b->neighbor[k]]);
+    kernels->pair_lines(lines, i, lines->coefficient + i * WIDTH, b->neighbor, b->count, mass,
+                        !sum->uniform, impulse);
+    if (!kernels->add_impulses(impulse, ASCC_IMPULSE_LIMIT, b->neighbor, b->count, sum->sum + i * 4,
+                               sum->sum))
+        ascc_pair_sum_note_bad(sum, i);
 }
 
 static void evaluate_walls(ascc_pair_sum *sum, size_t i, ascc_pair_batch *b)
 {
-    static const float nothing[ASCC_MAX_BUMPS];
-    static const uint32_t nobody[ASCC_PAIR_BATCH];
-    const ascc_network_run *run = sum->run;
-    const coefficients *c = sum->data;
-    const ascc_filter *filter = &run->plan->output.walls;
-    float geometry[ASCC_GEOMETRY_ARRAYS * ASCC_PAIR_BATCH];
-    double t[3][ASCC_PAIR_BATCH], square[ASCC_PAIR_BATCH];
-    strengths s = {.damping = {0.0f}};
-    ascc_geometry g;
-    ascc_geometry_of(&g, run, sum->rows, filter, i, b->neighbor, b->count, geometry,
-                     ASCC_PAIR_BATCH);
-    for (int part = ASCC_TENSOR_WALL; part <= ASCC_TENSOR_WALL_DAMPING; part++)
-        if (c->part[part])
-            run->tools->kernels->pair_strengths(
-                g.pairs.distance, nobody, b->count, c->part[part] + i * ASCC_MAX_BUMPS, nothing,
-                (size_t)filter->bumps, part == ASCC_TENSOR_WALL ? s.strength : s.damping);
-    weigh_walls(run, b, &s);
-    ascc_pair_displacements(sum->rows, NULL, i, b, t, square);
-    point_strengths(sum, i, b, &s, c->part[ASCC_TENSOR_WALL_DAMPING] != NULL, false, square, t);
-    for (int n = 0; n < 3; n++)
-        for (size_t k = 0; k < b->count; k++)
-            t[n][k] *= sum->mass[i];
-    ascc_pair_sum_add_walls(sum, i, b, t);
+    ascc_pair_impulses impulse;
+    float own[WIDTH];
+    multiply_rows(sum->run, WALLS, i, 1, own);
+    sum->run->tools->kernels->pair_lines(sum->data, i, own, b->neighbor, b->count, &sum->mass[i], 0,
+                                         impulse);
+    ascc_pair_sum_add_walls(sum, i, b, impulse);
 }
 
 static ascc_status impulses(const ascc_network_run *run, const ascc_impulse_scale *scale,
@@ -389,18 +357,21 @@ static ascc_status impulses(const ascc_network_run *run, const ascc_impulse_scal
     coefficients c = {.scale = scale};
     ascc_pair_sum sum;
     const ascc_status status =
-        ascc_pair_sum_open(&sum, run, ascc_network_set(run->network, term->source), scale->mass,
-                           (size_t)run->plan->dimension);
+        ascc_pair_sum_open(&sum, run, ascc_network_set(run->network, term->source), scale->mass, 4);
     if (status != ASCC_OK)
         return status;
-    if (!find_coefficients(&c, run, run->tools->arena, ascc_arena_lend) ||
+    c.seen = find_seen(run, sum.set);
+    if (!c.seen || !find_coefficients(&c, run, WALLS, run->tools->arena, ascc_arena_lend) ||
         (output->current_direction && !find_places(&c, &sum)))
         return ascc_fail(run->tools->message, ASCC_ERROR_MEMORY, "no memory for the impulses");
-    sum.data = &c;
+    ascc_lines lines = lines_of(&c, FLUID);
+    sum.data = &lines;
     sum.skip_coincident = !c.place;
     ascc_pair_sum_run(&sum, ascc_term_list(run, term, 0), evaluate);
-    if (output->has_walls)
+    if (output->has_walls) {
+        lines = lines_of(&c, WALLS);
         ascc_pair_sum_run_walls(&sum, ascc_term_list(run, term, 1), to->wall, evaluate_walls);
+    }
     return ascc_pair_sum_give(&sum, ascc_term_source(run, term), ascc_padded(term->inputs), to,
                               pair_count);
 }
@@ -410,7 +381,7 @@ static ascc_status impulses(const ascc_network_run *run, const ascc_impulse_scal
 /* What the visitor of pairs reads and adds to. */
 typedef struct gradients {
     coefficients c;
-    float *part[PARTS]; /* [row][8] */
+    float *side[SIDES]; /* [row][WIDTH] */
 } gradients;
 
 /* The two radial basis functions that reach a distance. */
@@ -438,12 +409,11 @@ static double strength_of(const ascc_pair_reverse *q, int part, size_t i, size_t
 {
     double sum = 0.0;
     *slope = 0.0;
-    const float *share = ((const gradients *)q->data)->c.part[part];
-    if (!share)
-        return 0.0;
+    const float *share = ((const gradients *)q->data)->c.side[part / 2];
     for (size_t k = 0; k < at->count; k++) {
-        const double a = (double)share[i * ASCC_MAX_BUMPS + at->first + k] +
-                         (both ? (double)share[j * ASCC_MAX_BUMPS + at->first + k] : 0.0);
+        const size_t place = place_of(part, at->first + k);
+        const double a =
+            (double)share[i * WIDTH + place] + (both ? (double)share[j * WIDTH + place] : 0.0);
         sum += at->value[k] * a;
         *slope += at->slope[k] * a;
     }
@@ -452,9 +422,9 @@ static double strength_of(const ascc_pair_reverse *q, int part, size_t i, size_t
 
 static void add_share(const ascc_pair_reverse *q, int part, size_t i, const bumps_at *at, double g)
 {
-    float *share = ((const gradients *)q->data)->part[part];
-    for (size_t k = 0; share && k < at->count; k++)
-        share[i * ASCC_MAX_BUMPS + at->first + k] += (float)(at->value[k] * g);
+    float *share = ((const gradients *)q->data)->side[part / 2];
+    for (size_t k = 0; k < at->count; k++)
+        share[i * WIDTH + place_of(part, at->first + k)] += (float)(at->value[k] * g);
 }
 
 /* One pair and what its impulse along u is made of: cosine * strength - damping * approach. */
@@ -531,7 +501,7 @@ static void find_pair(const ascc_pair_reverse *q, int part, const bumps_at *at, 
     }
     a->along = ascc_dot3(a->force, a->u);
     a->approach = 0.0;
-    if (((const gradients *)q->data)->c.part[part + 1]) {
+    if (plan->output.term.tensor[part + 1]) {
         const size_t width = ascc_padded(plan->fluid_channels);
         const float *motion = p->run->value[0].raw + ascc_plan_motion(plan, 0);
         for (int32_t c = 0; c < plan->dimension; c++)
@@ -568,7 +538,7 @@ static void pass_pair(const ascc_pair_reverse *q, int part, const ascc_filter *f
         add_share(q, part, side ? j : i, &at, a.area * a.cosine * a.along);
         add_share(q, part + 1, side ? j : i, &at, -a.area * a.approach * a.along);
     }
-    if (((const gradients *)q->data)->c.part[part + 1] && p->value[0].raw) {
+    if (plan->output.term.tensor[part + 1] && p->value[0].raw) {
         const size_t width = ascc_padded(plan->fluid_channels);
         float *motion = p->value[0].raw + ascc_plan_motion(plan, 0);
         for (int32_t c = 0; c < plan->dimension; c++) {
@@ -603,13 +573,13 @@ static void visit_walls(const ascc_pair_reverse *q)
 
 static bool take_gradients(gradients *g, const ascc_reverse *pass, size_t count)
 {
-    for (int part = 0; part < PARTS; part++) {
-        if (!pass->run->plan->output.term.tensor[part])
+    for (int side = 0; side < SIDES; side++) {
+        if (!has_side(&pass->run->plan->output.term, side))
             continue;
-        g->part[part] = ascc_arena_take(pass->pass->arena, count, ASCC_MAX_BUMPS * sizeof(float));
-        if (!g->part[part])
+        g->side[side] = ascc_arena_take(pass->pass->arena, count, WIDTH * sizeof(float));
+        if (!g->side[side])
             return false;
-        memset(g->part[part], 0, count * ASCC_MAX_BUMPS * sizeof(float));
+        memset(g->side[side], 0, count * WIDTH * sizeof(float));
     }
     return true;
 }
@@ -621,30 +591,29 @@ static void pass_coefficients(const ascc_pair_reverse *q, const gradients *g)
     const ascc_term *term = &pass->run->plan->output.term;
     const size_t count = pass->run->hierarchy->set[q->set].count, a = ascc_padded(term->inputs);
     const uint8_t *active = pass->run->value[term->source].active;
-    for (int part = 0; part < PARTS; part++) {
-        const float *from = g->part[part];
+    for (int side = 0; side < SIDES; side++) {
+        const float *from = g->side[side];
         if (!from)
             continue;
-        const size_t offset = (size_t)part * part_size(term);
+        const size_t offset = (size_t)side * side_size(term);
         if (q->value_gradient)
-            pass->run->tools->kernels->multiply(from, ASCC_MAX_BUMPS, count, ASCC_MAX_BUMPS,
+            pass->run->tools->kernels->multiply(from, WIDTH, count, WIDTH,
                                                 ascc_reverse_transposed(pass, term) + offset, a,
                                                 q->value_gradient, a);
         float *to = ascc_reverse_packed(pass, term) + offset;
         for (size_t i = 0; i < count; i++)
             for (size_t c = 0; active[i] && c < a; c++)
-                for (size_t k = 0; k < ASCC_MAX_BUMPS; k++)
-                    to[c * ASCC_MAX_BUMPS + k] +=
-                        q->value[i * a + c] * from[i * ASCC_MAX_BUMPS + k];
+                for (size_t k = 0; k < WIDTH; k++)
+                    to[c * WIDTH + k] += q->value[i * a + c] * from[i * WIDTH + k];
     }
 }
 
 static ascc_status backward(ascc_reverse *pass)
 {
-    gradients g = {.part = {NULL}};
+    gradients g = {.side = {NULL}};
     ascc_pair_reverse pairs;
     if (!ascc_pair_reverse_open(&pairs, pass) ||
-        !find_coefficients(&g.c, pass->run, pass->pass->arena, ascc_arena_take) ||
+        !find_coefficients(&g.c, pass->run, SIDES, pass->pass->arena, ascc_arena_take) ||
         !take_gradients(&g, pass, pass->run->hierarchy->set[pairs.set].count))
         return ASCC_ERROR_MEMORY;
     pairs.data = &g;

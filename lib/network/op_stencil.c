@@ -126,19 +126,16 @@ static void scratch(const ascc_plan *plan, const ascc_term *term, ascc_scratch_s
     sizes->column = ascc_max_size(sizes->column, ascc_matrix_length(term));
 }
 
+/* ---- Taps ---- */
+
 /* Rows of the corners around one by tap, x fastest; UINT32_MAX = not there. */
-static void find_taps(const ascc_network_run *run, const ascc_term *term, size_t row,
-                      uint32_t tap[MOST_TAPS])
+static void find_taps(const ascc_rows *rows, int32_t dimension, int32_t voxel, size_t row,
+                      uint32_t *tap)
 {
-    const ascc_rows *rows = ascc_term_list(run, term, 0);
-    const int32_t level = ascc_network_set(run->network, term->source);
-    const int32_t voxel = (int32_t)(voxel_of(run->plan, level) * run->hierarchy->scale.inverse);
     const uint32_t *neighbor = rows->neighbor + rows->start[row];
-    for (size_t t = 0; t < MOST_TAPS; t++)
-        tap[t] = UINT32_MAX;
     for (size_t k = 0; k < rows->count[row]; k++) {
         size_t number = 0;
-        for (int c = run->plan->dimension - 1; c >= 0; c--) {
+        for (int c = dimension - 1; c >= 0; c--) {
             const int32_t d = (int32_t)((uint32_t)rows->source->low[c][neighbor[k]] -
                                         (uint32_t)rows->query->low[c][row]);
             number = number * 3 + (d < -voxel / 2 ? 0u : d > voxel / 2 ? 2u : 1u);
@@ -147,18 +144,68 @@ static void find_taps(const ascc_network_run *run, const ascc_term *term, size_t
     }
 }
 
-/* The binomial weight of a tap. */
-static float weight_of(size_t tap, int32_t dimension)
+typedef struct taps_job {
+    const ascc_rows *rows;
+    int32_t dimension, voxel; /* voxel: units */
+    size_t taps;
+    uint32_t *table;
+} taps_job;
+
+static void fill_table(void *data, size_t begin, size_t end, int32_t slot)
 {
-    float weight = 1.0f;
-    for (int32_t c = 0; c < dimension; c++, tap /= 3)
-        weight *= tap % 3 == 1 ? 0.5f : 0.25f;
-    return weight;
+    (void)slot;
+    const taps_job *job = data;
+    memset(job->table + begin * job->taps, 0xff, (end - begin) * job->taps * sizeof *job->table);
+    for (size_t i = begin; i < end; i++)
+        if (job->rows->count[i] != ASCC_ROW_ABSENT)
+            find_taps(job->rows, job->dimension, job->voxel, i, job->table + i * job->taps);
+}
+
+static int32_t key_of(const ascc_network_run *run, const ascc_term *term)
+{
+    return run->network->term_key[ascc_plan_term_number(run->plan, term)][0];
+}
+
+/* The table of a level's neighbours, for all stencils on it. */
+static ascc_status prepare(const ascc_network_run *run, const ascc_term *term)
+{
+    const int32_t key = key_of(run, term);
+    const ascc_rows *rows = &run->rows[key];
+    const int32_t level = ascc_network_set(run->network, term->source);
+    taps_job job = {.rows = rows,
+                    .dimension = run->plan->dimension,
+                    .voxel = (int32_t)(voxel_of(run->plan, level) * run->hierarchy->scale.inverse),
+                    .taps = taps_of(run->plan)};
+    if (run->table[key])
+        return ASCC_OK;
+    job.table =
+        ascc_arena_take(run->tools->arena, rows->query->count, job.taps * sizeof *job.table);
+    if (!job.table)
+        return ascc_fail(run->tools->message, ASCC_ERROR_MEMORY, "no memory for a stencil");
+    ascc_workers_run(run->tools->workers, rows->query->count, 256, fill_table, &job);
+    run->table[key] = job.table;
+    return ASCC_OK;
+}
+
+static const uint32_t *taps_around(const ascc_network_run *run, const ascc_term *term, size_t row)
+{
+    return run->table[key_of(run, term)] + row * taps_of(run->plan);
+}
+
+/* The binomial weights of taps. */
+static void find_weights(int32_t dimension, float weight[MOST_TAPS])
+{
+    for (size_t t = 0; t < MOST_TAPS; t++) {
+        size_t place = t;
+        weight[t] = 1.0f;
+        for (int32_t c = 0; c < dimension; c++, place /= 3)
+            weight[t] *= place % 3 == 1 ? 0.5f : 0.25f;
+    }
 }
 
 /* Mean motion of the corners around, and their mean mass. */
-static float mean_motion(const ascc_network_run *run, const ascc_term *term,
-                         const uint32_t tap[MOST_TAPS], float u[3])
+static float mean_motion(const ascc_network_run *run, const ascc_term *term, const uint32_t *tap,
+                         const float weight[MOST_TAPS], float u[3])
 {
     const float *source = ascc_term_source(run, term);
     const size_t a = ascc_padded(term->inputs);
@@ -168,33 +215,39 @@ static float mean_motion(const ascc_network_run *run, const ascc_term *term,
     for (size_t t = 0; t < taps_of(run->plan); t++) {
         if (tap[t] == UINT32_MAX)
             continue;
-        const float weight = weight_of(t, d), *from = source + tap[t] * a;
-        mass += weight * from[0];
+        const float *from = source + tap[t] * a;
+        mass += weight[t] * from[0];
         for (int32_t c = 0; c < d; c++)
-            u[c] += weight * from[1 + c];
+            u[c] += weight[t] * from[1 + c];
     }
     for (int32_t c = 0; c < d; c++)
         u[c] = mass > 0.0f ? u[c] / mass : 0.0f;
     return mass;
 }
 
+/* ---- Columns ---- */
+
 static void gather_row(const ascc_network_run *run, const ascc_term *term, size_t row,
-                       float *column)
+                       const float weight[MOST_TAPS], float *column)
 {
     const int32_t d = run->plan->dimension, walls = 1 + d;
     const size_t a = ascc_padded(term->inputs), in = (size_t)term->inputs;
+    const size_t step = (size_t)tap_inputs(run->plan, term), taps = taps_of(run->plan);
     const float *source = ascc_term_source(run, term);
-    uint32_t tap[MOST_TAPS];
+    const uint32_t *tap = taps_around(run, term, row);
     float u[3] = {0.0f, 0.0f, 0.0f};
-    find_taps(run, term, row, tap);
     if (reads_sums(term))
-        (void)mean_motion(run, term, tap, u);
-    memset(column, 0, ascc_matrix_length(term) * sizeof *column);
-    for (size_t t = 0; t < taps_of(run->plan); t++, column += tap_inputs(run->plan, term)) {
-        if (tap[t] == UINT32_MAX)
+        (void)mean_motion(run, term, tap, weight, u);
+    for (size_t i = taps * step; i < ascc_matrix_length(term); i++)
+        column[i] = 0.0f;
+    for (size_t t = 0; t < taps; t++, column += step) {
+        if (tap[t] == UINT32_MAX) {
+            memset(column, 0, step * sizeof *column);
             continue;
+        }
         const float *from = source + tap[t] * a;
-        memcpy(column, from, in * sizeof *column);
+        for (size_t c = 0; c < in; c++)
+            column[c] = from[c];
         for (int32_t c = 0; reads_sums(term) && c < d; c++) {
             column[1 + c] = from[1 + c] - from[0] * u[c];
             column[in + (size_t)c] = -(from[walls] * u[c]);
@@ -205,18 +258,41 @@ static void gather_row(const ascc_network_run *run, const ascc_term *term, size_
 static size_t columns(const ascc_tile *tile, const ascc_term *term)
 {
     const size_t stride = ascc_matrix_length(term) + ASCC_COLUMN_PADDING;
+    float weight[MOST_TAPS];
+    find_weights(tile->run->plan->dimension, weight);
     for (size_t r = 0; r < tile->n; r++)
-        gather_row(tile->run, term, tile->list[r], tile->column + r * stride);
+        gather_row(tile->run, term, tile->list[r], weight, tile->column + r * stride);
     return tile->n;
+}
+
+/* Values are multiplied where they lie. */
+static void multiply_taps(const ascc_tile *tile, const ascc_term *term)
+{
+    static const float nothing[ASCC_MAX_CHANNELS];
+    const ascc_network_run *run = tile->run;
+    const size_t a = ascc_padded(term->inputs), taps = taps_of(run->plan);
+    const float *source = ascc_term_source(run, term), *in[ASCC_TILE_ROWS * MOST_TAPS];
+    for (size_t r = 0; r < tile->n; r++) {
+        const uint32_t *tap = taps_around(run, term, tile->list[r]);
+        for (size_t t = 0; t < taps; t++)
+            in[r * taps + t] = tap[t] == UINT32_MAX ? nothing : source + tap[t] * a;
+    }
+    run->tools->kernels->multiply_blocks(in, taps, tile->n, (size_t)term->inputs,
+                                         ascc_term_packed(run, term), ascc_padded(term->outputs),
+                                         tile->sum + term->column, tile->width);
 }
 
 static void forward(const ascc_tile *tile, const ascc_term *term)
 {
     const ascc_network_run *run = tile->run;
     const size_t length = ascc_matrix_length(term), stride = length + ASCC_COLUMN_PADDING;
-    (void)columns(tile, term);
     for (size_t r = 0; r < tile->n; r++)
         ascc_matrix_add_bias(run, term, tile->sum + r * tile->width + term->column);
+    if (!reads_sums(term)) {
+        multiply_taps(tile, term);
+        return;
+    }
+    (void)columns(tile, term);
     run->tools->kernels->multiply(tile->column, stride, tile->n, length,
                                   ascc_term_packed(run, term), ascc_padded(term->outputs),
                                   tile->sum + term->column, tile->width);
@@ -225,16 +301,16 @@ static void forward(const ascc_tile *tile, const ascc_term *term)
 /* ---- The way back ---- */
 
 /* From the gradient of a column of sums to the sums: mass, momentum, walls, normals of each tap. */
-static void scatter_sums(const ascc_network_run *run, const ascc_term *term,
-                         const uint32_t tap[MOST_TAPS], const float *column_gradient,
-                         float *gradient)
+static void scatter_sums(const ascc_network_run *run, const ascc_term *term, const uint32_t *tap,
+                         const float *column_gradient, float *gradient)
 {
     const int32_t d = run->plan->dimension, walls = 1 + d;
     const size_t a = ascc_padded(term->inputs), in = (size_t)term->inputs;
     const size_t step = (size_t)tap_inputs(run->plan, term);
     const float *source = ascc_term_source(run, term);
-    float u[3], by_u[3] = {0.0f, 0.0f, 0.0f}, along = 0.0f;
-    const float mass = mean_motion(run, term, tap, u);
+    float u[3], by_u[3] = {0.0f, 0.0f, 0.0f}, along = 0.0f, weights[MOST_TAPS];
+    find_weights(d, weights);
+    const float mass = mean_motion(run, term, tap, weights, u);
     for (size_t t = 0; t < taps_of(run->plan); t++) {
         if (tap[t] == UINT32_MAX)
             continue;
@@ -253,7 +329,7 @@ static void scatter_sums(const ascc_network_run *run, const ascc_term *term,
     for (size_t t = 0; mass > 0.0f && t < taps_of(run->plan); t++) {
         if (tap[t] == UINT32_MAX)
             continue;
-        const float weight = weight_of(t, d) / mass;
+        const float weight = weights[t] / mass;
         float *to = gradient + tap[t] * a;
         to[0] -= weight * along;
         for (int32_t c = 0; c < d; c++)
@@ -265,8 +341,7 @@ static void scatter_row(const ascc_network_run *run, const ascc_term *term, size
                         const float *column_gradient, float *gradient)
 {
     const size_t a = ascc_padded(term->inputs);
-    uint32_t tap[MOST_TAPS];
-    find_taps(run, term, row, tap);
+    const uint32_t *tap = taps_around(run, term, row);
     if (reads_sums(term)) {
         scatter_sums(run, term, tap, column_gradient, gradient);
         return;
@@ -282,10 +357,12 @@ static void backward(const ascc_reverse *pass, const ascc_layer *layer, const as
     (void)layer;
     const size_t length = ascc_matrix_length(term);
     float *gradient = ascc_reverse_source(pass, term);
+    float weight[MOST_TAPS];
+    find_weights(pass->run->plan->dimension, weight);
     if (gradient)
         ascc_matrix_back(pass, term, n);
     for (size_t r = 0; r < n; r++) {
-        gather_row(pass->run, term, list[r], pass->column);
+        gather_row(pass->run, term, list[r], weight, pass->column);
         ascc_matrix_keep_column(pass, term, r);
         if (gradient)
             scatter_row(pass->run, term, list[r], pass->column_gradient + r * length, gradient);
@@ -306,5 +383,6 @@ const ascc_operation ascc_op_stencil = {.name = "stencil",
                                         .cost = cost,
                                         .scratch = scratch,
                                         .columns = columns,
+                                        .prepare = prepare,
                                         .forward = forward,
                                         .backward = backward};

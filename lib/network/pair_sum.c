@@ -118,7 +118,40 @@ static size_t flush(ascc_pair_sum *sum, size_t i, ascc_pair_batch *batch)
     return count;
 }
 
+/* The first row after i that lies elsewhere: rows at one place follow one another. */
+static size_t first_apart(const ascc_pair_sum *sum, size_t i)
+{
+    const ascc_rows *rows = sum->rows;
+    size_t j = i + 1;
+    while (sum->skip_coincident && j < rows->source->count && coincident(rows, i, (uint32_t)j))
+        j++;
+    return j;
+}
+
+/* A pair of fluid particles belongs to the first of its rows; at one place they have no direction. */
 static size_t evaluate_row(ascc_pair_sum *sum, size_t i)
+{
+    const ascc_rows *rows = sum->rows;
+    const uint32_t *neighbor = rows->neighbor + rows->start[i];
+    const size_t count = rows->count[i], first = first_apart(sum, i);
+    ascc_pair_batch batch;
+    size_t pairs = 0;
+    batch.count = 0;
+    for (size_t k = 0; k < count;) {
+        const size_t stop = ascc_min_size(count, k + ASCC_PAIR_BATCH - batch.count);
+        for (; k < stop; k++) {
+            const uint32_t j = neighbor[k];
+            batch.neighbor[batch.count] = j;
+            batch.count += j >= first;
+        }
+        if (batch.count == ASCC_PAIR_BATCH || (k == count && batch.count))
+            pairs += flush(sum, i, &batch);
+    }
+    return pairs;
+}
+
+/* The same of a set with walls, whose pairs with fluid belong to the fluid's row. */
+static size_t evaluate_mixed_row(ascc_pair_sum *sum, size_t i)
 {
     const ascc_rows *rows = sum->rows;
     const uint32_t *neighbor = rows->neighbor + rows->start[i];
@@ -127,10 +160,8 @@ static size_t evaluate_row(ascc_pair_sum *sum, size_t i)
     batch.count = 0;
     for (size_t k = 0; k < rows->count[i]; k++) {
         const uint32_t j = neighbor[k];
-        if (j <= i && sum->fluid[j])
-            continue; /* that pair belongs to row j */
-        if (sum->skip_coincident && coincident(rows, i, j))
-            continue; /* no direction, no impulse */
+        if ((j <= i && sum->fluid[j]) || (sum->skip_coincident && coincident(rows, i, j)))
+            continue;
         batch.neighbor[batch.count] = j;
         if (++batch.count == ASCC_PAIR_BATCH)
             pairs += flush(sum, i, &batch);
@@ -146,9 +177,14 @@ static void evaluate_chunks(void *data, size_t begin, size_t end, int32_t slot)
     for (size_t c = begin; c < end; c++) {
         const size_t first = (c * 3 + sum->phase) * sum->chunk;
         size_t pairs = 0;
-        for (size_t i = first; i < ascc_min_size(first + sum->chunk, count); i++)
-            if (sum->fluid[i])
+        for (size_t i = first; i < ascc_min_size(first + sum->chunk, count); i++) {
+            if (sum->whole && sum->whole(sum, i))
+                continue;
+            if (sum->set == ASCC_SET_FLUID)
                 pairs += evaluate_row(sum, i);
+            else if (sum->fluid[i])
+                pairs += evaluate_mixed_row(sum, i);
+        }
         atomic_fetch_add_explicit(&sum->pairs, pairs, memory_order_relaxed);
     }
 }

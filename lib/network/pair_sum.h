@@ -31,7 +31,6 @@ typedef struct ascc_impulse_scale {
 #define ASCC_IMPULSE_LIMIT ((double)((int64_t)1 << 50))
 
 /* Pairs of one row, evaluated together. */
-#define ASCC_PAIR_BATCH 64
 typedef struct ascc_pair_batch {
     size_t count;
     uint32_t neighbor[ASCC_PAIR_BATCH];
@@ -56,6 +55,8 @@ typedef struct ascc_pair_sum {
     size_t stride;
     int64_t *wall;    /* [boundary rows of the host][dimension] */
     const void *data; /* the function's own */
+    /* Evaluates all pairs of row i of a set of fluid at once, if it can; else, or NULL: batch by batch. */
+    bool (*whole)(struct ascc_pair_sum *sum, size_t i);
 
     /* Under way: */
     const ascc_rows *rows;

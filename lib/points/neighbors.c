@@ -139,37 +139,85 @@ static size_t keep_nearest(const ascc_rows *rows, const int32_t at[3], uint32_t 
     return kept;
 }
 
-/* Appends the neighbours of one query within a run of slots; false when there are too many. */
-static bool search_run(const rows_job *job, size_t begin, size_t end, const int32_t at[3],
-                       uint32_t query, uint32_t *found, size_t *count, distance *heap)
+/* What a search needs again and again. */
+typedef struct searcher {
+    const rows_job *job;
+    ascc_coordinates points; /* of slots */
+    const uint32_t *order;   /* rows of slots, or NULL */
+    float limit;
+    size_t (*find)(const ascc_coordinates *points, const ascc_run *runs, size_t count, int32_t x,
+                   int32_t y, int32_t z, float limit, uint32_t *found);
+} searcher;
+
+static searcher searcher_of(const rows_job *job)
 {
     const ascc_rows *rows = job->rows;
     const ascc_grid *grid = rows->source_grid;
-    const ascc_coordinates points = {grid->low[0], grid->low[1], grid->low[2]};
     const ascc_kernels *kernels = job->tools->kernels;
     const bool cube = rows->inverse_cube > 0.0f;
-    const float limit = cube ? rows->inverse_cube : (float)(rows->radius * rows->radius);
-    while (begin < end) {
-        const size_t stop = ascc_min_size(end, begin + SEARCH_CHUNK);
-        const size_t n = (cube ? kernels->search_cube : kernels->search)(
-            &points, begin, stop, at[0], at[1], at[2], limit, found + *count);
-        uint32_t *fresh = found + *count;
-        size_t kept = 0;
-        for (size_t k = 0; k < n; k++) {
-            const uint32_t row = grid->order ? grid->order[fresh[k]] : fresh[k];
-            if (rows->skip_self && rows->source->low[0][row] == at[0] &&
-                rows->source->low[1][row] == at[1] && rows->source->low[2][row] == at[2])
-                continue;
-            fresh[kept++] = row;
-        }
-        *count += kept;
-        if (*count > (size_t)rows->max_neighbors) {
-            if (!rows->limit)
+    return (searcher){.job = job,
+                      .points = {grid->low[0], grid->low[1], grid->low[2]},
+                      .order = grid->order,
+                      .limit = cube ? rows->inverse_cube : (float)(rows->radius * rows->radius),
+                      .find = cube ? kernels->search_cube : kernels->search};
+}
+
+/* Drops points at the query's own place; returns how many are left. */
+static size_t drop_self(const ascc_rows *rows, const int32_t at[3], uint32_t *found, size_t count)
+{
+    size_t kept = 0;
+    for (size_t k = 0; k < count; k++) {
+        const uint32_t row = found[k];
+        if (rows->source->low[0][row] != at[0] || rows->source->low[1][row] != at[1] ||
+            rows->source->low[2][row] != at[2])
+            found[kept++] = row;
+    }
+    return kept;
+}
+
+/* Appends the neighbours of one query within runs of at most SEARCH_CHUNK slots in all; false when there are
+ * too many. */
+static bool search_piece(const searcher *s, const ascc_run *runs, size_t run_count,
+                         const int32_t at[3], uint32_t query, uint32_t *found, size_t *count,
+                         distance *heap)
+{
+    const ascc_rows *rows = s->job->rows;
+    uint32_t *fresh = found + *count;
+    size_t n = s->find(&s->points, runs, run_count, at[0], at[1], at[2], s->limit, fresh);
+    for (size_t k = 0; s->order && k < n; k++)
+        fresh[k] = s->order[fresh[k]];
+    if (rows->skip_self)
+        n = drop_self(rows, at, fresh, n);
+    *count += n;
+    if (*count > (size_t)rows->max_neighbors) {
+        if (!rows->limit)
+            return false;
+        distance cut;
+        *count = keep_nearest(rows, at, query, found, *count, heap, &cut);
+    }
+    return true;
+}
+
+/* Runs of slots around a cell, and how many slots that is. */
+typedef struct surroundings {
+    ascc_run run[9];
+    size_t cell[9]; /* where the last lookup in a row of cells ended: the next query cell is near */
+    size_t count, slots;
+} surroundings;
+
+/* All neighbours of one query; a crowd piece by piece. */
+static bool search_around(const searcher *s, const surroundings *around, const int32_t at[3],
+                          uint32_t query, uint32_t *found, size_t *count, distance *heap)
+{
+    if (around->slots <= SEARCH_CHUNK)
+        return search_piece(s, around->run, around->count, at, query, found, count, heap);
+    for (size_t r = 0; r < around->count; r++) {
+        ascc_run piece = {around->run[r].begin, around->run[r].begin};
+        for (; piece.end < around->run[r].end; piece.begin = piece.end) {
+            piece.end = ascc_min_size(around->run[r].end, piece.begin + SEARCH_CHUNK);
+            if (!search_piece(s, &piece, 1, at, query, found, count, heap))
                 return false;
-            distance cut;
-            *count = keep_nearest(rows, at, query, found, *count, heap, &cut);
         }
-        begin = stop;
     }
     return true;
 }
@@ -233,30 +281,26 @@ static size_t cell_at(const ascc_grid *grid, size_t from, uint64_t key)
     return low;
 }
 
-typedef struct run {
-    size_t cell; /* where the last lookup in this row of cells ended: the next query cell is near */
-    size_t begin, end;
-} run;
-
 /* The runs of source slots around a query cell: three cells along x each, for every (dz, dy). */
-static int find_runs(const ascc_rows *rows, uint64_t key, run *runs)
+static void find_runs(const ascc_rows *rows, uint64_t key, surroundings *around)
 {
     const ascc_grid *grid = rows->source_grid;
     const int reach = grid->flat ? 0 : 1;
-    int n = 0;
+    size_t n = 0;
+    around->slots = 0;
     for (int dz = -reach; dz <= reach; dz++)
         for (int dy = -1; dy <= 1; dy++, n++) {
             const uint64_t middle = key + ((uint64_t)(int64_t)dz << grid->shift_z) +
                                     ((uint64_t)(int64_t)dy << grid->shift_y);
-            const size_t first = cell_at(grid, runs[n].cell, middle - 1);
+            const size_t first = cell_at(grid, around->cell[n], middle - 1);
             size_t last = first;
             while (last < grid->cell_count && grid->key[last] <= middle + 1)
                 last++;
-            runs[n].cell = first;
-            runs[n].begin = grid->start[first];
-            runs[n].end = grid->start[last];
+            around->cell[n] = first;
+            around->run[n] = (ascc_run){grid->start[first], grid->start[last]};
+            around->slots += around->run[n].end - around->run[n].begin;
         }
-    return n;
+    around->count = n;
 }
 
 static bool row_wanted(const rows_job *job, size_t row)
@@ -272,25 +316,24 @@ static void make_rows(void *data, size_t begin, size_t end, int32_t slot)
     const ascc_grid *grid = rows->query_grid;
     uint32_t *found = job->scratch + (size_t)slot * job->scratch_size;
     distance *heap = rows->limit ? job->heap + (size_t)slot * (size_t)rows->limit : NULL;
-    run runs[9] = {0};
+    const searcher search = searcher_of(job);
+    surroundings around = {.count = 0};
     room set_aside = {0, 0, 0, 0};
     for (size_t c = begin; c < end; c++) {
-        int n = 0;
+        around.count = 0;
         for (size_t s = grid->start[c]; s < grid->start[c + 1]; s++) {
             const size_t row = grid->order ? grid->order[s] : s;
             if (!row_wanted(job, row))
                 continue;
-            if (n == 0)
-                n = find_runs(rows, grid->key[c], runs);
+            if (around.count == 0)
+                find_runs(rows, grid->key[c], &around);
             int32_t at[3];
             low_words(rows->query, row, at);
             size_t count = 0;
-            for (int r = 0; r < n; r++)
-                if (!search_run(job, runs[r].begin, runs[r].end, at, (uint32_t)row, found, &count,
-                                heap)) {
-                    atomic_store_explicit(&job->crowded, (unsigned)row + 1, memory_order_relaxed);
-                    return;
-                }
+            if (!search_around(&search, &around, at, (uint32_t)row, found, &count, heap)) {
+                atomic_store_explicit(&job->crowded, (unsigned)row + 1, memory_order_relaxed);
+                return;
+            }
             if (rows->limit)
                 count = keep_nearest(rows, at, (uint32_t)row, found, count, heap, &job->cut[row]);
             store_row(job, &set_aside, row, found, count);

@@ -102,7 +102,9 @@ static double value_bytes(const ascc_network *network, double fluid, double boun
 {
     double bytes = 0.0;
     for (int32_t v = 0; v < network->value_count; v++) {
-        const double copies = 4.0 * ((network->wants[v] & 1) + (network->wants[v] >> 1 & 1));
+        const bool stored = v < 2 || !ascc_network_passes_on(network, v - 2);
+        const double copies =
+            stored ? 4.0 * ((network->wants[v] & 1) + (network->wants[v] >> 1 & 1)) : 0.0;
         bytes += set_points(network->plan, ascc_network_set(network, v), fluid, boundary) *
                  (1.0 + copies * (double)ascc_padded(ascc_network_channels(network, v)));
     }
@@ -164,7 +166,7 @@ size_t ascc_estimate_scratch(const ascc_network *network, size_t fluid, size_t b
 {
     const ascc_plan *plan = network->plan;
     const double f = (double)fluid, b = (double)boundary, all = f + b, d = plan->dimension;
-    double points = 8.0 * d * (5.0 * f + b) + all * (2.0 * POINT_BYTES + 12.0);
+    double points = 8.0 * d * (5.0 * f + b) + all * (2.0 * POINT_BYTES + 28.0);
     for (int32_t l = 1; l < plan->level_count; l++)
         points += POINT_BYTES * set_points(plan, ASCC_SET_LEVEL + l - 1, f, b);
     double longest = 0.0;

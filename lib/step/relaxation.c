@@ -31,30 +31,27 @@ typedef struct relaxation {
     const ascc_rows *rows, *wall_rows;
     size_t count;
     float inverse_support;    /* of a unit */
-    int32_t *low[3];          /* positions */
+    int32_t *low;             /* positions [count][4] */
     const float *wall_volume; /* of wall rows */
     ascc_pair_sum sum;
     /* What the pairs are: */
     size_t *start, *end; /* [count + 1], [count] */
     uint32_t *neighbor;
     float *g[3], *weight;
-    float *own[3];  /* sum of g, walls included */
-    float *push[3]; /* the same by weight */
-    float *excess, *response, *pressure, *change, *move[3];
+    float *own[3];                                       /* sum of g, walls included */
+    float *push[3];                                      /* the same by weight */
+    float *excess, *response, *pressure, *change, *move; /* move: rows of 4 */
+    uint8_t *near;       /* rows with neighbours within the repulsion */
     const float *guess;  /* [count][padded] of pressures, times D_lattice; NULL = 0 */
     const double *place; /* [count][3] before the step, if corrections lie along those lines */
     float *scratch;      /* [slots][4][room] */
     size_t room;
     float omega;     /* of the sweep under way */
+    bool slows;      /* sweeps are on velocities, not densities */
     float repulsion; /* below this distance, in supports */
     atomic_size_t bad;
     atomic_uint_least64_t compression, largest;
 } relaxation;
-
-static ascc_coordinates coordinates(int32_t *const low[3])
-{
-    return (ascc_coordinates){low[0], low[1], low[2]};
-}
 
 static ascc_gradients gradients(const relaxation *r)
 {
@@ -82,7 +79,8 @@ static size_t whole_vectors(size_t count)
     return (count + 7) / 8 * 8;
 }
 
-/* Where each row's pairs begin, with room for all that its list has. */
+/* Where the pairs of each row may begin, with room for all that its list has; rows of a block then follow one
+ * another without gaps. */
 static size_t place_rows(relaxation *r)
 {
     size_t at = 0;
@@ -102,12 +100,13 @@ static bool lend_memory(relaxation *r)
     bool room = true;
     for (size_t i = 0; i < sizeof numbers / sizeof *numbers; i++)
         room &= (*numbers[i] = ascc_arena_lend(arena, n, sizeof(float))) != NULL;
-    for (int c = 0; c < 3; c++)
-        room &= (r->low[c] = ascc_arena_lend(arena, n, sizeof(int32_t))) != NULL;
+    r->low = ascc_arena_lend(arena, n, 4 * sizeof *r->low);
     r->start = ascc_arena_lend(arena, n, sizeof *r->start);
     r->end = ascc_arena_lend(arena, n, sizeof *r->end);
-    if (!room || !r->start || !r->end || !lend_vector(arena, r->own, n) ||
-        !lend_vector(arena, r->move, n))
+    r->move = ascc_arena_lend(arena, n, 4 * sizeof *r->move);
+    r->near = ascc_arena_lend(arena, n, 1);
+    if (!room || !r->start || !r->end || !r->low || !r->move || !r->near ||
+        !lend_vector(arena, r->own, n))
         return false;
     const size_t pairs = place_rows(r);
     r->room = whole_vectors(ascc_max_size(r->rows->longest, r->wall_rows->longest));
@@ -138,9 +137,23 @@ static bool find_place(relaxation *r, size_t i)
         const int64_t moved = at - h->set[ASCC_SET_FLUID].position[c][i];
         if (moved > FARTHEST || moved < -FARTHEST)
             return false;
-        r->low[c][i] = (int32_t)(uint32_t)(uint64_t)at;
+        r->low[i * 4 + c] = (int32_t)(uint32_t)(uint64_t)at;
     }
     return true;
+}
+
+/* The velocity as it is now, in supports a step. */
+static void find_velocity(relaxation *r, size_t i)
+{
+    const ascc_particles *p = r->state->particles;
+    const size_t d = (size_t)p->dimension;
+    const size_t row = ascc_hierarchy_host_row(&r->state->hierarchy, ASCC_SET_FLUID, i);
+    const double unit =
+        r->state->motion->time_step * p->quantum * r->state->length_unit / r->constants->support;
+    for (size_t c = 0; c < 4; c++)
+        r->move[i * 4 + c] =
+            c < d ? (float)((double)r->state->advance.momentum[row * d + c] * unit / p->mass[row])
+                  : 0.0f;
 }
 
 static void find_places(void *data, size_t begin, size_t end, int32_t slot)
@@ -152,42 +165,63 @@ static void find_places(void *data, size_t begin, size_t end, int32_t slot)
             ascc_note_first(&r->bad, i);
             return;
         }
+    for (size_t i = begin; r->slows && i < end; i++)
+        find_velocity(r, i);
 }
 
-/* Gradients of a row's pairs into scratch; sums as the kernel gives them. */
-static ascc_pairs look(const relaxation *r, size_t i, const ascc_rows *rows,
-                       int32_t *const source[3], const float *volumes, float *scratch, float sum[8])
+/* Is there another particle within the repulsion? The row itself is among its neighbours. */
+static uint8_t has_near(const relaxation *r, const float *distance, size_t count)
+{
+    size_t near = 0;
+    for (size_t k = 0; k < count; k++)
+        near += distance[k] < r->repulsion;
+    return near > 1;
+}
+
+/* Unit vectors and distances, in supports, from row i to neighbours among the fluid or walls. */
+static void find_directions(const relaxation *r, size_t i, bool walls, const uint32_t *neighbor,
+                            size_t count, const ascc_pairs *pairs)
 {
     const ascc_kernels *kernels = r->state->tools.kernels;
-    const ascc_coordinates points = coordinates(source);
-    const uint32_t *neighbor = rows->neighbor + rows->start[i];
+    int32_t *const *wall = r->state->hierarchy.set[ASCC_SET_BOUNDARY].low;
+    const ascc_coordinates points = {wall[0], wall[1], wall[2]};
+    const int32_t *at = r->low + i * 4;
+    if (walls)
+        kernels->geometry(&points, neighbor, count, at[0], at[1], at[2], r->inverse_support,
+                          ASCC_MAPPING_DIRECTION, pairs);
+    else
+        kernels->directions(r->low, neighbor, count, at, r->inverse_support, pairs);
+}
+
+/* Keeps the gradients of a row's fluid pairs; sums as the kernel gives them. */
+static void look(relaxation *r, size_t i, float *scratch, float sum[8])
+{
+    const ascc_kernels *kernels = r->state->tools.kernels;
+    const uint32_t *neighbor = r->rows->neighbor + r->rows->start[i];
+    const size_t count = r->rows->count[i], at = r->start[i];
     const ascc_pairs pairs = {.x = scratch,
                               .y = scratch + r->room,
                               .z = scratch + 2 * r->room,
                               .distance = scratch + 3 * r->room};
-    kernels->geometry(&points, neighbor, rows->count[i], r->low[0][i], r->low[1][i], r->low[2][i],
-                      r->inverse_support, ASCC_MAPPING_DIRECTION, &pairs);
-    kernels->spline(&pairs, neighbor, rows->count[i], (float)r->constants->amount, volumes, sum);
-    return pairs;
+    float *const g[3] = {r->g[0] + at, r->g[1] + at, r->g[2] + at};
+    find_directions(r, i, false, neighbor, count, &pairs);
+    r->near[i] = has_near(r, pairs.distance, count);
+    kernels->spline(&pairs, neighbor, count, (float)r->constants->amount, NULL, sum);
+    r->end[i] =
+        at + kernels->keep_gradients(&pairs, neighbor, count, (uint32_t)i, r->neighbor + at, g);
 }
 
-/* Keeps the pairs of a row that act. */
-static void keep(relaxation *r, size_t i, const ascc_pairs *pairs)
+static void look_at_walls(const relaxation *r, size_t i, float *scratch, float sum[8])
 {
-    const uint32_t *neighbor = r->rows->neighbor + r->rows->start[i];
-    size_t at = r->start[i];
-    for (size_t k = 0; k < r->rows->count[i]; k++) {
-        r->neighbor[at] = neighbor[k];
-        r->g[0][at] = pairs->x[k];
-        r->g[1][at] = pairs->y[k];
-        r->g[2][at] = pairs->z[k];
-        at += pairs->x[k] != 0.0f || pairs->y[k] != 0.0f || pairs->z[k] != 0.0f;
-    }
-    for (r->end[i] = at; (r->end[i] - r->start[i]) % 8; r->end[i]++) {
-        r->neighbor[r->end[i]] = (uint32_t)i;
-        for (int c = 0; c < 3; c++)
-            r->g[c][r->end[i]] = 0.0f;
-    }
+    const uint32_t *neighbor = r->wall_rows->neighbor + r->wall_rows->start[i];
+    const size_t count = r->wall_rows->count[i];
+    const ascc_pairs pairs = {.x = scratch,
+                              .y = scratch + r->room,
+                              .z = scratch + 2 * r->room,
+                              .distance = scratch + 3 * r->room};
+    find_directions(r, i, true, neighbor, count, &pairs);
+    r->state->tools.kernels->spline(&pairs, neighbor, count, (float)r->constants->amount,
+                                    r->wall_volume, sum);
 }
 
 /* Of unequal masses: a pair pushes row i by twice the other's share of both masses. Returns D. */
@@ -212,18 +246,28 @@ static float weigh(relaxation *r, size_t i, const float wall[3])
     return (along > 0.0f ? along : 0.0f) + squares;
 }
 
+/* How fast the fluid becomes denser, in place of how dense it is. */
+static void find_divergence(relaxation *r, size_t begin, size_t end)
+{
+    const ascc_gradients pairs = gradients(r);
+    for (size_t i = begin; i < end; i++)
+        if (r->excess[i] < -SURFACE)
+            r->response[i] = 0.0f;
+    r->state->tools.kernels->divergence(&pairs, begin, end, r->own, r->move, r->excess);
+}
+
 static void look_around(void *data, size_t begin, size_t end, int32_t slot)
 {
     relaxation *r = data;
     float *scratch = r->scratch + (size_t)slot * 4 * r->room;
     const float least = (float)(r->constants->epsilon * r->constants->lattice_response);
-    int32_t *const *walls = r->state->hierarchy.set[ASCC_SET_BOUNDARY].low;
     for (size_t i = begin; i < end; i++) {
         float sum[8], wall[8] = {0};
-        const ascc_pairs pairs = look(r, i, r->rows, r->low, NULL, scratch, sum);
-        keep(r, i, &pairs);
+        if (i > begin)
+            r->start[i] = r->end[i - 1];
+        look(r, i, scratch, sum);
         if (r->wall_rows->count[i])
-            (void)look(r, i, r->wall_rows, walls, r->wall_volume, scratch, wall);
+            look_at_walls(r, i, scratch, wall);
         float square = sum[4];
         for (int c = 0; c < 3; c++) {
             r->own[c][i] = sum[1 + c] + wall[1 + c];
@@ -234,6 +278,8 @@ static void look_around(void *data, size_t begin, size_t end, int32_t slot)
         r->excess[i] = (sum[0] + wall[0]) - 1.0f;
         r->response[i] = 1.0f / (square + least);
     }
+    if (r->slows)
+        find_divergence(r, begin, end);
 }
 
 /* Volumes of the walls that the step sees. */
@@ -248,18 +294,21 @@ static bool lend_volumes(relaxation *r)
     return volume != NULL;
 }
 
-/* Everything that sweeps read. */
-static ascc_status open_relaxation(relaxation *r, ascc_step_state *state)
+/* Everything that sweeps read. slows: of velocities. */
+static ascc_status open_relaxation(relaxation *r, ascc_step_state *state, bool slows)
 {
     const ascc_network_run *run = &state->run;
     const ascc_search_tools *tools = &state->tools;
     const ascc_relaxation *constants = &state->network->plan->relaxation;
-    *r = (relaxation){.state = state,
-                      .constants = constants,
-                      .rows = &run->rows[state->network->relaxation_key[0]],
-                      .wall_rows = &run->rows[state->network->relaxation_key[1]],
-                      .count = state->hierarchy.set[ASCC_SET_FLUID].count,
-                      .inverse_support = (float)(state->hierarchy.scale.unit / constants->support)};
+    *r =
+        (relaxation){.state = state,
+                     .constants = constants,
+                     .rows = &run->rows[state->network->relaxation_key[0]],
+                     .wall_rows = &run->rows[state->network->relaxation_key[1]],
+                     .count = state->hierarchy.set[ASCC_SET_FLUID].count,
+                     .inverse_support = (float)(state->hierarchy.scale.unit / constants->support),
+                     .repulsion = slows ? 0.0f : (float)(constants->repulsion / constants->support),
+                     .slows = slows};
     if (r->count > INT32_MAX)
         return ascc_fail(tools->message, ASCC_ERROR_RANGE, "more than 2^31 particles to relax");
     ascc_status status = ascc_wall_volumes_update(state->walls, tools, state->particles,
@@ -389,12 +438,9 @@ static void corrections(const relaxation *r, size_t i, ascc_pair_batch *b, bool 
     const ascc_kernels *kernels = r->state->tools.kernels;
     const ascc_pairs pairs = {
         .x = geometry[0], .y = geometry[1], .z = geometry[2], .distance = geometry[3]};
-    const ascc_coordinates points =
-        coordinates(walls ? r->state->hierarchy.set[ASCC_SET_BOUNDARY].low : r->low);
     const float limit = (float)(r->constants->limit / r->constants->support);
     const float amount = (float)r->constants->amount;
-    kernels->geometry(&points, b->neighbor, b->count, r->low[0][i], r->low[1][i], r->low[2][i],
-                      r->inverse_support, ASCC_MAPPING_DIRECTION, &pairs);
+    find_directions(r, i, walls, b->neighbor, b->count, &pairs);
     const bool near = !walls && find_repulsion(r, &pairs, b->count, apart);
     kernels->spline(&pairs, b->neighbor, b->count, amount, walls ? r->wall_volume : NULL, sum);
     for (size_t k = 0; k < b->count; k++) {
@@ -422,6 +468,25 @@ static double impulse_factor(const relaxation *r)
     const ascc_step_state *state = r->state;
     return r->constants->support / state->length_unit / state->motion->time_step /
            state->particles->quantum;
+}
+
+/* Of a row without repulsion what was kept is all. */
+static bool evaluate_kept(ascc_pair_sum *sum, size_t i)
+{
+    const relaxation *r = sum->data;
+    if (r->near[i])
+        return false;
+    const ascc_gradients pairs = gradients(r);
+    const ascc_pressures pressures = {.pressure = r->pressure,
+                                      .limit = (float)(r->constants->limit / r->constants->support),
+                                      .factor = impulse_factor(r),
+                                      .mass = sum->mass,
+                                      .uniform = sum->uniform,
+                                      .place = r->place};
+    if (!r->state->tools.kernels->pressure_impulses(&pairs, &pressures, i, ASCC_IMPULSE_LIMIT,
+                                                    sum->sum))
+        ascc_pair_sum_note_bad(sum, i);
+    return true;
 }
 
 static void evaluate(ascc_pair_sum *sum, size_t i, ascc_pair_batch *b)
@@ -461,6 +526,7 @@ static ascc_status apply(relaxation *r, int64_t *given)
     const ascc_impulses to = {given, r->state->impulses.wall};
     uint64_t pairs;
     r->sum.data = r;
+    r->sum.whole = evaluate_kept;
     r->sum.skip_coincident = false; /* where the network saw them; now they may be apart */
     ascc_pair_sum_run(&r->sum, r->rows, evaluate);
     ascc_pair_sum_run_walls(&r->sum, r->wall_rows, r->state->impulses.wall, evaluate_walls);
@@ -572,12 +638,11 @@ static ascc_status relax(ascc_step_state *state, relaxation *r, int64_t *given)
 {
     const ascc_particles *p = state->particles;
     ascc_step_statistics *s = state->statistics;
-    ascc_status status = given ? open_relaxation(r, state) : no_memory(state);
+    ascc_status status = given ? open_relaxation(r, state, false) : no_memory(state);
     if (status == ASCC_OK && !find_lines(r))
         status = no_memory(state);
     if (status != ASCC_OK)
         return status;
-    r->repulsion = (float)(r->constants->repulsion / r->constants->support);
     if (r->constants->guess)
         r->guess = state->run.value[r->constants->guess].rectified;
     memset(r->change, 0, r->count * sizeof *r->change);
@@ -607,43 +672,12 @@ ascc_status ascc_stage_relaxation(ascc_step_state *state)
     return status;
 }
 
-/* Velocities as they are now, in supports a step. */
-static void find_velocities(relaxation *r)
-{
-    const ascc_particles *p = r->state->particles;
-    const ascc_hierarchy *h = &r->state->hierarchy;
-    const size_t d = (size_t)p->dimension;
-    const double unit =
-        r->state->motion->time_step * p->quantum * r->state->length_unit / r->constants->support;
-    for (size_t i = 0; i < r->count; i++) {
-        const size_t row = ascc_hierarchy_host_row(h, ASCC_SET_FLUID, i);
-        for (size_t c = 0; c < 3; c++)
-            r->move[c][i] =
-                c < d
-                    ? (float)((double)r->state->advance.momentum[row * d + c] * unit / p->mass[row])
-                    : 0.0f;
-    }
-}
-
-static void diverge_rows(void *data, size_t begin, size_t end, int32_t slot)
-{
-    (void)slot;
-    relaxation *r = data;
-    const ascc_gradients pairs = gradients(r);
-    for (size_t i = begin; i < end; i++)
-        if (r->excess[i] < -SURFACE)
-            r->response[i] = 0.0f;
-    r->state->tools.kernels->divergence(&pairs, begin, end, r->own, r->move, r->excess);
-}
-
 static ascc_status slow_down(ascc_step_state *state, relaxation *r, int64_t *given)
 {
     const ascc_particles *p = state->particles;
-    ascc_status status = given ? open_relaxation(r, state) : no_memory(state);
+    ascc_status status = given ? open_relaxation(r, state, true) : no_memory(state);
     if (status != ASCC_OK)
         return status;
-    find_velocities(r);
-    ascc_workers_run(state->tools.workers, r->count, ROWS, diverge_rows, r);
     sweep(r, &r->constants->divergence);
     status = apply(r, given);
     for (size_t k = 0; status == ASCC_OK && k < p->fluid_count * (size_t)p->dimension; k++)

@@ -25,6 +25,7 @@ bool ascc_rollout_worker_open(ascc_rollout_worker *w, ascc_context *context,
         ascc_arena_open(&w->kept[i], &context->allocator);
     if (w->kept && w->state && ascc_step_create(context, model, NULL, &w->step) == ASCC_OK) {
         w->step->keeps_relaxed = true;
+        w->step->network.keeps_values = true;
         return true;
     }
     ascc_rollout_worker_close(w);
