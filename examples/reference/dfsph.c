@@ -40,6 +40,7 @@ dfsph *dfsph_create(const dfsph_options *options)
     set_default(&o->courant, 0.4);
     set_default(&o->density_error, 1e-4);
     set_default(&o->divergence_error, 1e-3);
+    set_default(&o->release, 1.0);
     set_default(&o->skin, 0.3);
     o->iterations = o->iterations > 0 ? o->iterations : 100;
     s->support = 2.0 * o->spacing;
@@ -238,7 +239,7 @@ static double fastest(const dfsph *s)
 {
     double most = 0.0;
     for (size_t i = 0; i < s->fluid; i++)
-        most = fmax(most, size_of(s->v[i]));
+        most = size_of(s->v[i]) > most ? size_of(s->v[i]) : most;
     for (size_t w = 0; w < s->walls && s->body_count; w++)
         if (s->wall_body[w]) {
             const rigid *b = &s->body[s->wall_body[w] - 1];

@@ -35,7 +35,9 @@ typedef struct dfsph_options {
         divergence_error; /* the same of rates, in one step; 0 = 1e-3, negative = no such solver */
     int32_t iterations;   /* of each solver at most; 0 = 100 */
     int32_t reserved;
-    double skin; /* of the neighbour lists, in spacings; 0 = 0.3 */
+    double release; /* 1/s, of the density: more compression than that is not let go at once, as
+                                overlap would burst; 0 = 1 */
+    double skin;    /* of the neighbour lists, in spacings; 0 = 0.3 */
 } dfsph_options;
 
 /* What dfsph_advance has done since dfsph_set_fluid. */

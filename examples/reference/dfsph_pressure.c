@@ -28,10 +28,10 @@ typedef struct sweep {
     double force[DFSPH_BODIES][3], spin[DFSPH_BODIES][3]; /* accelerations of bodies */
 } sweep;
 
-/* Cubic spline of support 1 without its factor, and its slope. */
+/* Cubic spline of support 1 without its factor, and its slope; q at most 1. */
 static inline double spline(double q, double *slope)
 {
-    const double a = fmax(1.0 - q, 0.0), b = fmax(0.5 - q, 0.0);
+    const double a = 1.0 - q, b = q < 0.5 ? 0.5 - q : 0.0;
     *slope = 24.0 * b * b - 6.0 * a * a;
     return 2.0 * a * a * a - 8.0 * b * b * b;
 }
@@ -104,7 +104,8 @@ static void look_row(dfsph *s, size_t i)
     s->near_count[i] = near;
     s->pair_count[i] = count;
     s->slope[i] = (dfsph_four){(float)sum[0], (float)sum[1], (float)sum[2], 0.0f};
-    s->inverse[i] = (float)squares;
+    /* where points overlap, that many answer alike: iterations would diverge */
+    s->inverse[i] = (float)(density > 1.0 ? density * squares : squares);
 }
 
 static void look_rows(void *data, size_t begin, size_t end, int32_t slot)
@@ -372,7 +373,9 @@ void dfsph_end_compression(dfsph *s, double dt)
     sweep w = {.s = s, .pressure = s->hold, .gain = dt * dt};
     near_run(s->lists, s->fluid, find_rates, s);
     for (size_t i = 0; i < s->fluid; i++) {
-        s->wanted[i] = (float)(1.0 - s->density[i] + dt * (double)s->wanted[i]);
+        /* 1 - density, or what may be let go of it */
+        const double static_part = fmax(1.0 - s->density[i], -dt * s->options.release);
+        s->wanted[i] = (float)(static_part + dt * (double)s->wanted[i]);
         s->hold[i] *= s->wanted[i] < 0.0f ? 0.5f : 0.0f;
     }
     s->totals.density_iterations += solve(&w, 2, s->options.density_error, dt);

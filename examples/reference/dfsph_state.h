@@ -46,8 +46,7 @@ struct dfsph {
                            times p / rho^2, m^2/s^2 */
     rigid body[DFSPH_BODIES];
     size_t body_count;
-    dfsph_touch *touch; /* [body_count][fluid] of bodies that move */
-    float *stiffness;   /* [fluid] what free bodies add to 1 / inverse, at most */
+    dfsph_touch *touch;                          /* [body_count][fluid] of bodies that move */
     double support, volume, mass, normalisation; /* m, m^d, kg, 1/m^d */
     double wall_drift;                           /* m that walls moved since the lists were made */
     double wall_impulse[3];
@@ -55,7 +54,7 @@ struct dfsph {
     ascc_message message;
 };
 
-/* Room for `count` more rows, in all arrays of rows. */
+/* Room for `count` rows in all arrays of rows. */
 ascc_status dfsph_reserve(dfsph *s, size_t count);
 
 /* Lists, pairs and densities at the present positions. */
