@@ -152,6 +152,12 @@ ascc_status dfsph_set_fluid(dfsph *s, size_t count, const double *position, cons
     return reserve_touch(s);
 }
 
+void dfsph_set_forces(dfsph *s, const double gravity[3], double viscosity)
+{
+    memcpy(s->options.gravity, gravity, sizeof s->options.gravity);
+    s->options.viscosity = viscosity;
+}
+
 /* ---- Walls and bodies ---- */
 
 static ascc_status add_points(dfsph *s, size_t count, const double *position, uint8_t body)

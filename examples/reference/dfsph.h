@@ -67,6 +67,9 @@ ascc_status dfsph_add_body(dfsph *solver, size_t count, const double *position, 
 const rigid *dfsph_body(const dfsph *solver, size_t number);
 void dfsph_drive_body(dfsph *solver, size_t number, const double velocity[3], const double spin[3]);
 
+/* Gravity and viscosity from now on. */
+void dfsph_set_forces(dfsph *solver, const double gravity[3], double viscosity);
+
 /* Advances by dt seconds in steps of its own. errors: MEMORY, RANGE (positions), LIMIT; the state is then of
  * no use. */
 ascc_status dfsph_advance(dfsph *solver, double dt);
