@@ -1,6 +1,6 @@
 #!/bin/sh
 # Makes what 2D networks learn from in examples/train/runs/data2d: the scenes of water2d beside the given ones, ten
-# minutes; and a set over the whole range, with configs that train from it alone (runs/plain), about 0.1 core-hours.
+# minutes; and a set over the whole range, with configs that train from it alone (runs/plain), about 0.05 core-hours.
 # SPDX-License-Identifier: MIT
 # sh examples/train/data2d.sh [PROGRAM [SHARE [THREADS]]]     SHARE: per cent of the set over the range (100)
 set -eu

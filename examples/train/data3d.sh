@@ -1,6 +1,6 @@
 #!/bin/sh
 # Makes what 3D networks learn from in examples/train/runs/data3d: the scenes of water3d beside the given ones, seconds;
-# and a set over the whole range, with configs that train from it alone (runs/plain), about 0.5 core-hours.
+# and a set over the whole range, with configs that train from it alone (runs/plain), about 0.4 core-hours.
 # SPDX-License-Identifier: MIT
 # sh examples/train/data3d.sh [PROGRAM [SHARE [THREADS]]]     SHARE: per cent of the set over the range (100)
 set -eu

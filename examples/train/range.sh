@@ -54,5 +54,7 @@ configs() {
 # spent: CPU time of all that this shell has run, and how many sequences there are.
 spent() {
     echo "$(ls "$out"/train | wc -l) sequences to learn from, $(ls "$out"/valid | wc -l) to choose by, of $(ls "$out"/made | wc -l) made"
-    times | awk 'END { split($1, a, /[ms]/); printf "CPU time of this run: %.3f core-hours\n", (60 * a[1] + a[2]) / 3600 }'
+    times >"$out/times.txt" # not through a pipe: that would be another shell's
+    awk 'END { split($1, a, /[ms]/); printf "CPU time of this run: %.4f core-hours\n", (60 * a[1] + a[2]) / 3600 }' \
+        "$out/times.txt"
 }
