@@ -48,7 +48,7 @@ configs() {
             !inside { gsub(/"runs\//, "\""); print }
             /^  },/ { inside = 0 }' "$config" >"runs/plain/$config"
     done
-    echo "configs for a clone without other data: $(ls runs/plain | tr '\n' ' ')"
+    echo "configs for a clone without other data: $(cd runs/plain && echo *.json)"
 }
 
 # spent: CPU time of all that this shell has run, and how many sequences there are.
