@@ -1,5 +1,5 @@
 #!/bin/sh
-# The stability suite on two scenes with two methods: what passes, what fails; prints TAP.
+# The stability suite on two scenes with three methods: what passes, what fails; prints TAP.
 # $1: a build folder. SPDX-License-Identifier: MIT
 cd "$(dirname "$0")/.." || exit 1
 stability=$(cd "${1:-build}" && pwd)/bench/stability || exit 1
@@ -30,10 +30,11 @@ old
 <!-- matrix ends -->
 after
 END
-"$stability" --quick --budget 60 --frames 8 --docs docs --methods 'SPH;ballistic' \
+"$stability" --quick --budget 60 --frames 8 --docs docs --methods 'SPH;DFSPH;ballistic' \
     --scenes 'dam break;jet at a sheet' >out 2>err
 holds 'the suite runs' [ $? -eq 0 ]
 holds 'SPH holds a dam break for eight frames' grep -qE '^dam break +SPH .* pass: 8 of 8' out
+holds 'DFSPH holds a dam break for eight frames' grep -qE '^dam break +DFSPH .* pass: 8 of 8' out
 holds 'SPH holds a jet at one layer of wall' grep -qE '^jet at a sheet +SPH .* pass: 8 of 8' out
 holds 'free flight is seen to go through it' grep -qE '^jet at a sheet +ballistic .* through' out
 holds 'the matrix replaces the old one, and nothing else' sh -c '

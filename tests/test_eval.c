@@ -64,13 +64,9 @@ static const ascc_method method_lost = {.prefix = "lost",
                                         .read = lost_read,
                                         .close = ascc_plain_close};
 
-const ascc_method *const ascc_methods[] = {&ascc_method_ballistic,
-                                           &ascc_method_sph,
-                                           &ascc_method_pbf,
-                                           &method_frozen,
-                                           &method_broken,
-                                           &method_lost,
-                                           NULL};
+const ascc_method *const ascc_methods[] = {
+    &ascc_method_ballistic, &ascc_method_sph, &ascc_method_dfsph, &ascc_method_pbf,
+    &method_frozen,         &method_broken,   &method_lost,       NULL};
 
 /* ---- Sequences ------------------------------------------------------------------------------- */
 
@@ -234,6 +230,12 @@ static void reference_solvers_fly_freely(void **state)
         assert_near(figure(text, "err_n2_stored"), 0.0, 4 * ROUNDING);
         assert_near(figure(text, "err_n2_difference"), 0.0, 4 * ROUNDING);
     }
+    /* DFSPH takes stored velocities as those of its own last step: half a step of gravity ahead. */
+    assert_int_equal(evaluate("dfsph:step=0.001", "test_eval.json", "--frames", "0:20:10"), 0);
+    assert_near(figure(read_text("test_eval.json"), "err_n2_difference"), 0.0, 4 * ROUNDING);
+    assert_near(figure(read_text("test_eval.json"), "err_n2_stored"), -0.0005 * 2 * DT * GRAVITY,
+                4 * ROUNDING);
+    assert_int_equal(evaluate("dfsph:iterations=-1", "test_eval.json", NULL, NULL), 1);
     assert_int_equal(evaluate("sph:cs=20,none=1", "test_eval.json", NULL, NULL), 1);
     assert_int_equal(evaluate("sph:cs=fast", "test_eval.json", NULL, NULL), 1);
     assert_int_equal(evaluate("pbf:iterations=0", "test_eval.json", NULL, NULL), 1);

@@ -13,16 +13,21 @@
 #include <unistd.h>
 
 #include "../examples/ascc/commands.h"
+#include "flow.h"
 #include "inspect.h"
 #include "pbf.h"
+#include "sequence.h"
 #include "recipes.h"
 
 /* ---- SPH ---- */
 
 static void make(const char *kind, int32_t dimension, uint64_t number, double spacing, recipe *r)
 {
-    const recipe_options options = {
-        .seed = 7, .number = number, .dimension = dimension, .spacing = spacing};
+    const recipe_options options = {.seed = 7,
+                                    .number = number,
+                                    .dimension = dimension,
+                                    .spacing = spacing,
+                                    .solver = RECIPE_SPH};
     assert_int_equal(recipe_make(kind, &options, r), ASCC_OK);
 }
 
@@ -315,22 +320,118 @@ static void wrong_use_of_the_generator_is_refused(void **state)
     assert_int_equal(ascc_command_generate(5, none), 2);
 }
 
+static void options_of_the_generator_arrive(void **state)
+{
+    (void)state;
+    char directory[] = "/tmp/ascc-options-XXXXXX", path[512], error[256];
+    static const char *const solvers[] = {"sph", "dfsph"};
+    assert_non_null(mkdtemp(directory));
+    (void)snprintf(path, sizeof path, "%s/ramps2d_3_0000.safetensors", directory);
+    for (int k = 0; k < 2; k++) {
+        char *arguments[] = {"ramps2d",
+                             "--seed",
+                             "3",
+                             "--frames",
+                             "3",
+                             "--spacing",
+                             "0.025",
+                             "--frame",
+                             "0.004",
+                             "--gravity",
+                             "0.5",
+                             "--solver",
+                             (char *)(uintptr_t)solvers[k],
+                             "-o",
+                             directory};
+        assert_int_equal(ascc_command_generate(15, arguments), 0);
+        ascc_sequence s;
+        assert_true(ascc_sequence_read(path, &s, error, sizeof error));
+        assert_true(s.time_step == 0.004 && s.gravity[1] == -0.5 * 9.81);
+        assert_true((strstr(s.source, "; DFSPH") != NULL) == (k == 1));
+        ascc_sequence_free(&s);
+        assert_int_equal(unlink(path), 0);
+    }
+    char *other[] = {"ramps2d", "--solver", "flip", "-o", directory};
+    assert_int_equal(ascc_command_generate(5, other), 2);
+}
+
 static void every_kind_makes_a_scene_clear_of_its_walls(void **state)
 {
     (void)state;
     for (size_t k = 0; recipe_kinds[k][0]; k++)
-        for (uint64_t number = 0; number < 5; number++) {
+        for (uint64_t number = 0; number < 20; number++) {
+            const recipe_options options = {.seed = 7,
+                                            .number = number,
+                                            .dimension = k < 3        ? 0
+                                                         : number % 2 ? 2
+                                                                      : 3,
+                                            .solver = number % 4 < 2 ? RECIPE_DFSPH : RECIPE_SPH};
             recipe r;
-            make(recipe_kinds[k][0], 0, number, 0.0, &r);
-            assert_true(r.count > 100);
+            assert_int_equal(recipe_make(recipe_kinds[k][0], &options, &r), ASCC_OK);
+            assert_true(r.count > 100 && r.settled <= r.count &&
+                        strlen(r.text) < sizeof r.text - 1);
+            const double gap = r.dimension == 3 && r.solver == RECIPE_DFSPH ? 0.99 : 0.49;
             for (size_t i = 0; i < r.count && r.solid_count; i++) {
                 double at[3] = {0}, normal[3];
                 memcpy(at, r.position + i * (size_t)r.dimension, (size_t)r.dimension * sizeof *at);
                 assert_true(solids_distance(r.solids, r.solid_count, r.dimension, at, normal) >
-                            0.49 * r.spacing);
+                            gap * r.spacing);
             }
             recipe_free(&r);
         }
+}
+
+/* A room of 10 x 10 x 10 with a block of 4 x 4 x 4 on its floor and a ball above. */
+static void faces_have_their_points_where_fluid_can_be(void **state)
+{
+    (void)state;
+    const solid solids[] = {{.kind = SOLID_ROOM, .center = {5, 5, 5}, .half = {5, 5, 5}},
+                            {.kind = SOLID_BOX, .center = {5, 2, 5}, .half = {2, 2, 2}},
+                            {.kind = SOLID_BALL, .center = {5, 7, 5}, .radius = 2}};
+    wall_points w = {0};
+    assert_true(solids_sample_faces(solids, 3, 0.5, &w));
+    double at_floor = 0.0;
+    for (size_t i = 0; i < w.count; i++) {
+        const double *x = w.position + 3 * i, *n = w.normal + 3 * i;
+        double away[3], out[3];
+        assert_true(fabs(solids_distance(solids, 3, 3, x, away)) < 1e-9);
+        for (int c = 0; c < 3; c++)
+            out[c] = x[c] + 0.01 * n[c];
+        assert_true(fabs(solids_distance(solids, 3, 3, out, away) - 0.01) < 1e-9);
+        at_floor += x[1] == 0.0 ? 1.0 : 0.0;
+    }
+    assert_true(at_floor == 20.0 * 20.0 - 8.0 * 8.0);
+    /* 600 of the room less the floor below the block, five sides of it, the ball: four points each */
+    const double area = 600.0 - 16.0 + 80.0 + 16.0 * 3.14159265;
+    assert_true(fabs((double)w.count / (4.0 * area) - 1.0) < 0.01);
+    wall_points_free(&w);
+}
+
+/* Half a metre of water in its first frame: slower than a fall by a tenth of a spacing, and at the density of rest. */
+static void still_tank_begins_at_rest(void **state)
+{
+    (void)state;
+    for (int32_t d = 2; d <= 3; d++) {
+        const recipe_options options = {.seed = 2, .dimension = d, .spacing = d == 2 ? 0.025 : 0.1};
+        recipe r;
+        flow *f;
+        wall_points walls;
+        assert_int_equal(recipe_make("still-tank", &options, &r), ASCC_OK);
+        assert_int_equal(flow_create(&r, 2, &f, &walls), ASCC_OK);
+        const size_t values = r.count * (size_t)d;
+        float *frame = malloc(2 * values * sizeof *frame);
+        flow_read(f, frame);
+        double square = 0.0;
+        for (size_t i = 0; i < values; i++)
+            square += (double)frame[values + i] * (double)frame[values + i] / (double)r.count;
+        assert_true(square < 2.0 * 9.81 * 0.1 * r.spacing);
+        assert_true(fabs(flow_mass(f) / (1000.0 * pow(r.spacing, d)) - (d == 2 ? 1.0 : 0.8)) <
+                    1e-9);
+        free(frame);
+        flow_destroy(&f);
+        wall_points_free(&walls);
+        recipe_free(&r);
+    }
 }
 
 /* ---- Linter ---- */
@@ -451,7 +552,10 @@ int main(void)
         cmocka_unit_test(same_seed_gives_same_bytes),
         cmocka_unit_test(a_stopped_run_goes_on),
         cmocka_unit_test(wrong_use_of_the_generator_is_refused),
+        cmocka_unit_test(options_of_the_generator_arrive),
         cmocka_unit_test(every_kind_makes_a_scene_clear_of_its_walls),
+        cmocka_unit_test(faces_have_their_points_where_fluid_can_be),
+        cmocka_unit_test(still_tank_begins_at_rest),
         cmocka_unit_test(linter_accepts_water_that_falls),
         cmocka_unit_test(linter_rejects_a_spike),
         cmocka_unit_test(linter_rejects_an_escape),

@@ -31,14 +31,14 @@ labelled(p, s, f) = sprintf("< awk -v s=%s -v e=%d -v low=%g -v high=%g -f bench
     s, error(p), low(p), high(p), csv, f)
 
 set datafile separator "\t"
-families = "network SPH PBF"
-title_x = "0.18 0.34 0.66"
-titles = "'networks' 'SPH: speed of sound c (m/s), time step dt, spacing dx' 'PBF: substeps x iterations'"
-colour(k) = k == 1 ? "#c0392b" : k == 2 ? "#2166ac" : "#1b7837"
-shape(k) = k == 1 ? 7 : k == 2 ? 5 : 9
+families = "network SPH DFSPH PBF"
+title_x = "0.08 0.20 0.51 0.72"
+titles = "'networks' 'SPH: speed of sound c (m/s), time step dt, spacing dx' 'DFSPH: steps a frame' 'PBF: substeps x iterations'"
+colour(k) = k == 1 ? "#c0392b" : k == 2 ? "#2166ac" : k == 3 ? "#8e44ad" : "#1b7837"
+shape(k) = k == 1 ? 7 : k == 2 ? 5 : k == 3 ? 13 : 9
 set multiplot layout 2,3 margins 0.06,0.985,0.115,0.90 spacing 0.055,0.13 \
     title "Cost and accuracy: lower left is better. Grey steps: Pareto front. Dotted: ballistic, the floor"
-do for [k = 1:3] {
+do for [k = 1:4] {
     set label k word(titles, k) at screen word(title_x, k) + 0.0,0.035 left offset 1,0 \
         point pt shape(k) ps 1.3 lc rgb colour(k)
 }
@@ -50,13 +50,13 @@ do for [s in "test_000 dam_break"] {
         flat = floor_of(p, s) + 0.0
         plot flat with lines dt 3 lw 2 lc rgb "#888888" notitle, \
             led(p, s) using 1:2 with steps lw 6 lc rgb "#d8d8d8" notitle, \
-            for [k = 1:3] labelled(p, s, word(families, k)) using 2:3:($7 - $2):($8 - $3) \
+            for [k = 1:4] labelled(p, s, word(families, k)) using 2:3:($7 - $2):($8 - $3) \
                 with vectors nohead lw 0.5 lc rgb colour(k) notitle, \
-            for [k = 1:3] labelled(p, s, word(families, k)) using 2:3 with points pt shape(k) ps 1.3 \
+            for [k = 1:4] labelled(p, s, word(families, k)) using 2:3 with points pt shape(k) ps 1.3 \
                 lc rgb colour(k) notitle, \
-            for [k = 1:3] labelled(p, s, word(families, k)) using 4:5:6 with labels center font ",10" \
+            for [k = 1:4] labelled(p, s, word(families, k)) using 4:5:6 with labels center font ",10" \
                 tc rgb colour(k) notitle
-        do for [k = 1:3] { unset label k }
+        do for [k = 1:4] { unset label k }
     }
 }
 unset multiplot

@@ -30,6 +30,7 @@ static const char *const methods[][2] = {
     {"demo", "demo"},
     {"SPH", "sph:cs=25"},
     {"SPH, step x 8", "sph:cs=25,courant=4"},
+    {"DFSPH", "dfsph:"},
     {"PBF", "pbf:iterations=4,substeps=4"},
     {"ballistic", "ballistic"},
 };

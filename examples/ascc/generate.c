@@ -1,4 +1,4 @@
-/* ascc generate: sequences of random scenes, by the reference solver. SPDX-License-Identifier: MIT */
+/* ascc generate: sequences of random scenes, by the reference solvers. SPDX-License-Identifier: MIT */
 #include <errno.h>
 #include <pthread.h>
 #include <stdio.h>
@@ -8,6 +8,7 @@
 
 #include "commands.h"
 #include "console.h"
+#include "flow.h"
 #include "new_file.h"
 #include "progress.h"
 #include "recipes.h"
@@ -34,27 +35,18 @@ static void usage(FILE *out)
     fprintf(
         out,
         "usage: ascc generate KIND -o DIR [--seed S] [--count N] [--threads T] [--frames F]\n"
-        "                     [--dimension 2|3] [--spacing METRES] [--all-velocities]\n\n"
+        "                     [--dimension 2|3] [--spacing METRES] [--all-velocities]\n"
+        "                     [--solver dfsph|sph] [--frame SECONDS] [--gravity TIMES]\n\n"
         "Writes DIR/KIND_S_0000.safetensors and on. Files that exist are kept, so that the same\n"
-        "command goes on where it was stopped. The same seed gives the same bytes for any T.\n\n");
+        "command goes on where it was stopped. The same seed gives the same bytes for any T.\n"
+        "dfsph, the default, is DFSPH as the given 3D sequences were made with; sph is weakly\n"
+        "compressible SPH. --frame is the time between frames, --gravity a factor of the "
+        "kind's.\n\n");
     for (size_t k = 0; recipe_kinds[k][0]; k++)
         fprintf(out, "  %-13s %s\n", recipe_kinds[k][0], recipe_kinds[k][1]);
 }
 
 /* ---- One sequence ---- */
-
-/* Positions and velocities as floats into frame[2][count * dimension]. */
-static void read_frame(const sph *solver, int32_t dimension, float *frame)
-{
-    size_t count;
-    const sph_particle *p = sph_particles(solver, &count, NULL);
-    const size_t d = (size_t)dimension;
-    for (size_t i = 0; i < count; i++)
-        for (size_t c = 0; c < d; c++) {
-            frame[i * d + c] = (float)p[i].position[c];
-            frame[(count + i) * d + c] = (float)p[i].velocity[c];
-        }
-}
 
 static float *to_floats(const double *values, size_t count)
 {
@@ -64,28 +56,27 @@ static float *to_floats(const double *values, size_t count)
     return floats;
 }
 
-static void describe(const request *q, const recipe *r, const wall_points *walls, double mass,
+static void describe(const request *q, const recipe *r, const flow *f, const wall_points *walls,
                      ascc_sequence *s)
 {
+    char solver[400];
     *s = (ascc_sequence){.dimension = r->dimension,
                          .time_step = r->frame,
                          .radius = 0.5 * r->spacing,
-                         .mass = mass,
+                         .mass = flow_mass(f),
                          .rest_density = 1000.0,
                          .count = r->count,
                          .walls = walls->count,
                          .first_layer = walls->layer_count[0]};
     memcpy(s->gravity, r->gravity, sizeof s->gravity);
+    flow_describe(f, walls, solver, sizeof solver);
     (void)snprintf(s->source, sizeof s->source,
-                   "ascc generate %s, seed %llu, number %llu; weakly compressible SPH of "
-                   "examples/reference (Wendland C2, h = 1.5 spacings, speed of sound %.3g m/s, "
-                   "alpha 0.05, walls of Adami et al. 2012, %d layers, the first half a spacing "
-                   "behind the surface); scene: %s",
-                   q->kind, (unsigned long long)q->recipe.seed, (unsigned long long)r->number,
-                   10.0 * r->speed, walls->layers, r->text);
+                   "ascc generate %s, seed %llu, number %llu; %s; scene: %s", q->kind,
+                   (unsigned long long)q->recipe.seed, (unsigned long long)r->number, solver,
+                   r->text);
 }
 
-static bool write_frames(const request *q, const recipe *r, sph *solver,
+static bool write_frames(const request *q, const recipe *r, flow *solver,
                          ascc_sequence_writer *writer, char *error, size_t capacity)
 {
     const size_t values = r->count * (size_t)r->dimension;
@@ -94,12 +85,12 @@ static bool write_frames(const request *q, const recipe *r, sph *solver,
     if (!good)
         (void)snprintf(error, capacity, "no memory for a frame");
     for (int32_t f = 0; f < r->frames && good; f++) {
-        if (f > 0 && sph_advance(solver, r->frame) != ASCC_OK) {
-            (void)snprintf(error, capacity, "frame %d: %s", (int)f, sph_message(solver));
+        if (f > 0 && flow_advance(solver, r->frame) != ASCC_OK) {
+            (void)snprintf(error, capacity, "frame %d: %s", (int)f, flow_message(solver));
             good = false;
             break;
         }
-        read_frame(solver, r->dimension, frame);
+        flow_read(solver, frame);
         good = ascc_sequence_append(
             writer, frame, f == 0 || q->all_velocities ? frame + values : NULL, error, capacity);
     }
@@ -113,17 +104,17 @@ static bool make_sequence(const request *q, const char *path, uint64_t number, i
     recipe_options options = q->recipe;
     options.number = number;
     recipe r;
-    sph *solver;
+    flow *solver;
     wall_points walls;
     (void)snprintf(error, capacity, "no memory for the scene");
     if (recipe_make(q->kind, &options, &r) != ASCC_OK)
         return false;
-    if (recipe_solver(&r, threads, &solver, &walls) != ASCC_OK) {
+    if (flow_create(&r, threads, &solver, &walls) != ASCC_OK) {
         recipe_free(&r);
         return false;
     }
     ascc_sequence header;
-    describe(q, &r, &walls, sph_mass(solver), &header);
+    describe(q, &r, solver, &walls, &header);
     header.wall = to_floats(walls.position, walls.count * (size_t)r.dimension);
     header.normal = to_floats(walls.normal, walls.count * (size_t)r.dimension);
     bool good = header.wall && header.normal;
@@ -139,7 +130,7 @@ static bool make_sequence(const request *q, const char *path, uint64_t number, i
     }
     free(header.wall);
     free(header.normal);
-    sph_destroy(&solver);
+    flow_destroy(&solver);
     wall_points_free(&walls);
     recipe_free(&r);
     return good;
@@ -240,6 +231,18 @@ static bool take_option(request *q, const char *name, const char *value)
     if (strcmp(name, "--dimension") == 0 && read_integer(value, 2, 3, &n)) {
         q->recipe.dimension = (int32_t)n;
         return true;
+    }
+    if (strcmp(name, "--solver") == 0) {
+        q->recipe.solver = strcmp(value, "sph") == 0 ? RECIPE_SPH : RECIPE_DFSPH;
+        return strcmp(value, "sph") == 0 || strcmp(value, "dfsph") == 0;
+    }
+    if (strcmp(name, "--frame") == 0) {
+        q->recipe.frame = strtod(value, &end);
+        return *value && !*end && q->recipe.frame > 1e-6 && q->recipe.frame < 1e3;
+    }
+    if (strcmp(name, "--gravity") == 0) {
+        q->recipe.gravity = strtod(value, &end);
+        return *value && !*end && q->recipe.gravity > 0.0 && q->recipe.gravity <= 100.0;
     }
     if (strcmp(name, "--spacing") == 0) {
         q->recipe.spacing = strtod(value, &end);

@@ -91,6 +91,7 @@ void ascc_plain_close(void *state);
 /** All methods, NULL at the end: a word means the first whose prefix it begins with. */
 extern const ascc_method *const ascc_methods[];
 
-extern const ascc_method ascc_method_ballistic, ascc_method_sph, ascc_method_pbf, ascc_method_model;
+extern const ascc_method ascc_method_ballistic, ascc_method_sph, ascc_method_dfsph, ascc_method_pbf,
+    ascc_method_model;
 
 #endif

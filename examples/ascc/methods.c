@@ -4,6 +4,7 @@
 const ascc_method *const ascc_methods[] = {
     &ascc_method_ballistic,
     &ascc_method_sph,
+    &ascc_method_dfsph,
     &ascc_method_pbf,
     &ascc_method_model, /* takes every word: last */
     NULL,

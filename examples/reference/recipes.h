@@ -9,6 +9,9 @@
 #include "solids.h"
 #include "sph.h"
 
+/* What computes a recipe: places of walls and of the first particles depend on it. */
+typedef enum recipe_solver_kind { RECIPE_DFSPH = 0, RECIPE_SPH = 1 } recipe_solver_kind;
+
 #define RECIPE_SOLIDS 8
 
 /* Zero is the kind's own choice. */
@@ -17,6 +20,10 @@ typedef struct recipe_options {
     int32_t dimension;
     int32_t frames;
     double spacing; /* m; lengths of the scene stay */
+    double frame;   /* s between frames */
+    double gravity; /* times the kind's; 0 = 1 */
+    recipe_solver_kind solver;
+    int32_t reserved;
 } recipe_options;
 
 typedef struct recipe {
@@ -24,7 +31,13 @@ typedef struct recipe {
     int32_t dimension, frames;
     double spacing, frame; /* m; s between frames */
     double gravity[3];
-    double speed; /* m/s, that the flow may reach: the speed of sound is ten times that */
+    recipe_solver_kind solver;
+    double volume;            /* of a particle, in spacing^dimension */
+    double viscosity;         /* m^2/s, of DFSPH */
+    double settle;            /* s that pass before the first frame, calmed; of DFSPH */
+    double settle_gravity[3]; /* in that time */
+    size_t settled; /* particles that settle: the first so many, the rest comes later; 0 = all */
+    double speed;   /* m/s, that the flow may reach: the speed of sound is ten times that */
     solid solids[RECIPE_SOLIDS];
     size_t solid_count;
     size_t count;
@@ -40,7 +53,7 @@ extern const char *const recipe_kinds[][2];
 ascc_status recipe_make(const char *kind, const recipe_options *options, recipe *made);
 void recipe_free(recipe *made);
 
-/* A solver with the recipe's fluid and walls; walls receives them. errors: MEMORY. */
+/* An SPH solver with the recipe's fluid and walls; walls receives them. errors: MEMORY. */
 ascc_status recipe_solver(const recipe *made, int32_t thread_count, sph **solver,
                           wall_points *walls);
 

@@ -199,6 +199,69 @@ bool solids_sample(const solid *solids, size_t count, int32_t dimension, double 
     return true;
 }
 
+/* ---- Points on surfaces ---- */
+
+/* Adds a point of solid `own` unless another solid covers it. */
+static bool add_bare(const solid *solids, size_t count, size_t own, const double at[3],
+                     const double normal[3], wall_points *w)
+{
+    double away[3];
+    const double before = solids_distance(solids, own, 3, at, away);
+    const double behind = solids_distance(solids + own + 1, count - own - 1, 3, at, away);
+    return fmin(before, behind) < 1e-6 || add_point(w, 3, at, normal);
+}
+
+static bool add_faces(const solid *solids, size_t count, size_t own, double spacing, wall_points *w)
+{
+    const solid *s = &solids[own];
+    const double way = s->kind == SOLID_ROOM ? -1.0 : 1.0;
+    for (int face = 0; face < 6; face++) {
+        const int a = face % 3, b = (a + 1) % 3, c = (a + 2) % 3;
+        const double sign = face < 3 ? -1.0 : 1.0;
+        const int nb = (int)fmax(1.0, ceil(2.0 * s->half[b] / spacing - 1e-6)),
+                  nc = (int)fmax(1.0, ceil(2.0 * s->half[c] / spacing - 1e-6));
+        for (int k = 0; k < nb * nc; k++) {
+            double at[3], normal[3] = {0};
+            normal[a] = way * sign;
+            at[a] = s->center[a] + sign * s->half[a];
+            at[b] = s->center[b] + s->half[b] * (2.0 * (k % nb + 0.5) / nb - 1.0);
+            at[c] = s->center[c] + s->half[c] * (2.0 * (k / nb + 0.5) / nc - 1.0);
+            if (!add_bare(solids, count, own, at, normal, w))
+                return false;
+        }
+    }
+    return true;
+}
+
+static bool add_sphere(const solid *solids, size_t count, size_t own, double spacing,
+                       wall_points *w)
+{
+    const solid *s = &solids[own];
+    const double golden = PI * (3.0 - sqrt(5.0));
+    const int n = (int)fmax(1.0, rint(4.0 * PI * s->radius * s->radius / (spacing * spacing)));
+    for (int k = 0; k < n; k++) {
+        const double z = 1.0 - 2.0 * (k + 0.5) / n, across = sqrt(1.0 - z * z);
+        const double normal[3] = {across * cos(golden * k), across * sin(golden * k), z};
+        double at[3];
+        for (int c = 0; c < 3; c++)
+            at[c] = s->center[c] + s->radius * normal[c];
+        if (!add_bare(solids, count, own, at, normal, w))
+            return false;
+    }
+    return true;
+}
+
+bool solids_sample_faces(const solid *solids, size_t count, double spacing, wall_points *walls)
+{
+    bool good = true;
+    for (size_t i = 0; i < count && good; i++)
+        good = solids[i].kind == SOLID_BALL ? add_sphere(solids, count, i, spacing, walls)
+                                            : add_faces(solids, count, i, spacing, walls);
+    walls->layers = 1;
+    walls->layer_count[0] = walls->count;
+    return good;
+}
+
 void wall_points_free(wall_points *walls)
 {
     free(walls->position);

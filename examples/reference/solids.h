@@ -44,6 +44,9 @@ double solids_distance(const solid *solids, size_t count, int32_t dimension, con
  * without memory. */
 bool solids_sample(const solid *solids, size_t count, int32_t dimension, double spacing,
                    int32_t layers, wall_points *walls);
+/* Adds one layer of points on the surfaces, in 3D and about `spacing` apart: boxes' faces evenly, balls by the
+ * golden angle. Those inside another solid, or where two touch, are left out. False without memory. */
+bool solids_sample_faces(const solid *solids, size_t count, double spacing, wall_points *walls);
 void wall_points_free(wall_points *walls);
 
 #endif

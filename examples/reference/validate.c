@@ -11,24 +11,14 @@
 #include "pbf.h"
 #include "base/common.h"
 #include "recipes.h"
+#include "validate.h"
 
 #define PI 3.14159265358979323846
-#define G 9.81
-
-typedef struct report {
-    const char *docs; /* NULL = no files */
-    int32_t threads;
-    char table[16384];
-    size_t length;
-    bool good;
-} report;
 
 /* ---- Table and figures ---- */
 
-static void row(report *r, const char *what, bool passes, const char *bound, const char *format,
-                ...) ASCC_PRINTF(5, 6);
-static void row(report *r, const char *what, bool passes, const char *bound, const char *format,
-                ...)
+void validate_row(report *r, const char *what, bool passes, const char *bound, const char *format,
+                  ...)
 {
     char found[256];
     va_list arguments;
@@ -133,8 +123,9 @@ static void hydrostatic(report *r)
          "plot [0:1.05] DATA with points pt 7 ps 0.4 title 'SPH', 1-x with lines lw 2 title "
          "'exact'");
     const double ratio = bottom / (1000.0 * G * level);
-    row(r, "hydrostatic column, pressure at the bottom, mean of 1 to 2 s", fabs(ratio - 1) < 0.02,
-        "1 within 2 %", "%.4f rho g h (%.0f spacings deep)", ratio, level / c.spacing);
+    validate_row(r, "hydrostatic column, pressure at the bottom, mean of 1 to 2 s",
+                 fabs(ratio - 1) < 0.02, "1 within 2 %", "%.4f rho g h (%.0f spacings deep)", ratio,
+                 level / c.spacing);
     sph_destroy(&s);
     wall_points_free(&walls);
     recipe_free(&c);
@@ -160,8 +151,6 @@ static double time_at(const double *front, int frames, double step, double x)
             return step * (f - (front[f] - x) / (front[f] - front[f - 1]));
     return NAN;
 }
-
-#define DAM_FRAMES 80
 
 /* Front of a column of 1 m x 2 m in a tank of 4 m x 3 m. */
 static bool run_dam(int32_t threads, double front[DAM_FRAMES], double step)
@@ -199,30 +188,20 @@ static bool run_dam(int32_t threads, double front[DAM_FRAMES], double step)
     return good;
 }
 
-static void dam_break(report *r)
+/* Compares a front with the experiment, and writes what that has to *data if given. */
+static void judge_dam(report *r, FILE *experiment, const char *what, const double *front,
+                      FILE *data)
 {
-    FILE *experiment = open_experiment();
-    double front[DAM_FRAMES];
-    const double step = 0.01;
-    if (!experiment || !run_dam(r->threads, front, step)) {
-        if (experiment)
-            (void)fclose(experiment);
-        return;
-    }
-    FILE *data = open_data(r, "dambreak");
-    for (int f = 0; data && f < DAM_FRAMES; f++)
-        fprintf(data, "%.3f %.4f\n", f * step, front[f]);
-    if (data)
-        fprintf(data, "\n\n");
     char line[512];
     double mean = 0.0, most = 0.0, theirs = 0.0, count = 0.0;
+    rewind(experiment);
     while (fgets(line, sizeof line, experiment)) {
         double t, x, simulated, difference, reached;
         if (sscanf(line, "%lf,%lf,%lf,%lf,%lf", &t, &x, &simulated, &difference, &reached) != 5)
             continue;
         if (data)
             fprintf(data, "%.4f %.4f %.4f\n", t, x, simulated);
-        const double lead = t - time_at(front, DAM_FRAMES, step, x);
+        const double lead = t - time_at(front, DAM_FRAMES, DAM_STEP, x);
         if (x > 3.8 || !isfinite(lead)) /* the far wall is near */
             continue;
         mean += lead;
@@ -230,6 +209,29 @@ static void dam_break(report *r)
         most = fmax(most, fabs(lead));
         count += 1.0;
     }
+    validate_row(r, what, most < 0.075, "about 0.05 s, as DualSPHysics",
+                 "mean %.3f s, most %.3f s (DualSPHysics: mean %.3f s)", mean / count, most,
+                 theirs / count);
+}
+
+static void dam_break(report *r)
+{
+    FILE *experiment = open_experiment();
+    static double front[DAM_FRAMES], other[DAM_FRAMES];
+    if (!experiment || !run_dam(r->threads, front, DAM_STEP) ||
+        !validate_dfsph_dam(r->threads, other)) {
+        if (experiment)
+            (void)fclose(experiment);
+        return;
+    }
+    FILE *data = open_data(r, "dambreak");
+    for (int f = 0; data && f < DAM_FRAMES; f++)
+        fprintf(data, "%.3f %.4f %.4f\n", f * DAM_STEP, front[f], other[f]);
+    if (data)
+        fprintf(data, "\n\n");
+    judge_dam(r, experiment, "dam break, lead of the front over the experiment", front, data);
+    judge_dam(r, experiment, "DFSPH: dam break, lead of the front over the experiment", other,
+              NULL);
     (void)fclose(experiment);
     if (data)
         (void)fclose(data);
@@ -237,11 +239,9 @@ static void dam_break(report *r)
          "set title 'Front of a collapsing column, 1 m x 2 m'\nset xlabel 'time, s'\n"
          "set ylabel 'front, m'",
          "plot [0:0.8][0.9:4.2] DATA index 0 with lines lw 2 title 'SPH, spacing 0.02 m', DATA "
-         "index 1 using 1:3 with linespoints title 'DualSPHysics, spacing 0.02 m', DATA index 1 "
+         "index 0 using 1:3 with lines lw 2 dt 2 title 'DFSPH, spacing 0.02 m', DATA index 1 "
+         "using 1:3 with linespoints title 'DualSPHysics, spacing 0.02 m', DATA index 1 "
          "using 1:2 with points pt 7 title 'Koshizuka and Oka 1996'");
-    row(r, "dam break, lead of the front over the experiment", most < 0.075,
-        "about 0.05 s, as DualSPHysics", "mean %.3f s, most %.3f s (DualSPHysics: mean %.3f s)",
-        mean / count, most, theirs / count);
 }
 
 static void droplets(report *r)
@@ -265,7 +265,8 @@ static void droplets(report *r)
             }
         error = fmax(error, hypot(sum[0] - start[0], sum[1] - start[1]) / size);
     }
-    row(r, "two droplets, no gravity, change of momentum over the sum of its sizes, worst of 0.5 s",
+    validate_row(
+        r, "two droplets, no gravity, change of momentum over the sum of its sizes, worst of 0.5 s",
         error < 1e-13, "rounding", "%.1e", error);
     sph_destroy(&s);
     recipe_free(&c);
@@ -356,12 +357,14 @@ static void vortices(report *r)
          "set xlabel 'particle spacing'\nset ylabel 'relative error'",
          "f(x)=a*x**b\na=1\nb=1\nfit f(x) DATA via a,b\nplot [0.008:0.05] DATA with points pt 7 ps "
          "1.5 title 'SPH', f(x) with lines title sprintf('order %.2f', b)");
-    row(r, "Taylor-Green, rate of decay from 0.1 to 0.5 s, 50 x 50", fabs(v[1].rate - 1) < 0.05,
-        "1 within 5 %", "%.4f of 8 pi^2 nu (25 x 25: %.4f, 100 x 100: %.4f)", v[1].rate, v[0].rate,
-        v[2].rate);
+    validate_row(r, "Taylor-Green, rate of decay from 0.1 to 0.5 s, 50 x 50",
+                 fabs(v[1].rate - 1) < 0.05, "1 within 5 %",
+                 "%.4f of 8 pi^2 nu (25 x 25: %.4f, 100 x 100: %.4f)", v[1].rate, v[0].rate,
+                 v[2].rate);
     const double slope = log(v[0].error / v[2].error) / log(4.0);
-    row(r, "order of convergence, Taylor-Green velocity, 25 to 100", slope > 0.9, "1 or better",
-        "%.2f (errors %.4f, %.4f, %.4f)", slope, v[0].error, v[1].error, v[2].error);
+    validate_row(r, "order of convergence, Taylor-Green velocity, 25 to 100", slope > 0.9,
+                 "1 or better", "%.2f (errors %.4f, %.4f, %.4f)", slope, v[0].error, v[1].error,
+                 v[2].error);
 }
 
 /* ---- Clumping ---- */
@@ -424,11 +427,12 @@ static void clumping(report *r)
         (void)snprintf(name, sizeof name, "clumping in a splash, %s", choices[k].name);
         const bool last = k + 1 == sizeof choices / sizeof *choices;
         if (splash(r, &choices[k].options, &f))
-            row(r, name, !last || f.pair_worst < 0.01, last ? "worst below 1 %" : "for comparison",
-                "nearer than 0.3 spacings: mean %.2f %%, worst %.2f %%; fastest %.1f m/s",
-                100 * f.pair_mean, 100 * f.pair_worst, f.fastest);
+            validate_row(r, name, !last || f.pair_worst < 0.01,
+                         last ? "worst below 1 %" : "for comparison",
+                         "nearer than 0.3 spacings: mean %.2f %%, worst %.2f %%; fastest %.1f m/s",
+                         100 * f.pair_mean, 100 * f.pair_worst, f.fastest);
         else
-            row(r, name, !last, "for comparison", "did not run to its end");
+            validate_row(r, name, !last, "for comparison", "did not run to its end");
     }
 }
 
@@ -481,9 +485,9 @@ static void position_based(report *r)
          "set logscale xy\nset xlabel 'iterations'\nset ylabel 'mean compression'\n"
          "set key top right",
          "plot DATA with linespoints pt 7 title 'mean of max(density - 1, 0)'");
-    row(r, "position based fluids, mean compression with 1, 2, 4, 8, 16, 32 iterations", falls,
-        "falls", "%.4f, %.4f, %.4f, %.4f, %.4f, %.4f", error[0], error[1], error[2], error[3],
-        error[4], error[5]);
+    validate_row(r, "position based fluids, mean compression with 1, 2, 4, 8, 16, 32 iterations",
+                 falls, "falls", "%.4f, %.4f, %.4f, %.4f, %.4f, %.4f", error[0], error[1], error[2],
+                 error[3], error[4], error[5]);
 }
 
 int main(int argc, char **argv)
@@ -500,6 +504,7 @@ int main(int argc, char **argv)
     vortices(&r);
     position_based(&r);
     clumping(&r);
+    validate_dfsph(&r);
     dam_break(&r);
     if (r.docs)
         write_table(&r);

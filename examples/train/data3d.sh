@@ -1,11 +1,35 @@
 #!/bin/sh
-# Makes the scenes that water3d learns from beside the given ones, in examples/train/runs/data3d: seconds.
+# Makes what 3D networks learn from in examples/train/runs/data3d: the scenes of water3d beside the given ones, seconds;
+# and a set over the whole range, with configs that train from it alone (runs/plain), about 0.4 core-hours.
 # SPDX-License-Identifier: MIT
-# sh examples/train/data3d.sh [PROGRAM]
+# sh examples/train/data3d.sh [PROGRAM [SHARE [THREADS]]]     SHARE: per cent of the set over the range (100)
 set -eu
 cd "$(dirname "$0")"
 ascc=${1:-../../build/examples/ascc}
+share=${2:-100}
+threads=${3:-$(nproc)}
 out=runs/data3d
 mkdir -p "$out"
-"$ascc" generate droplets -o "$out" --dimension 3 --seed 6 --count 3 --frames 80 --spacing 0.05
-"$ascc" generate free-fall -o "$out" --dimension 3 --seed 5 --count 2 --frames 40 --spacing 0.05
+"$ascc" generate droplets -o "$out" --dimension 3 --seed 6 --count 3 --frames 80 --spacing 0.05 --solver sph
+"$ascc" generate free-fall -o "$out" --dimension 3 --seed 5 --count 2 --frames 40 --spacing 0.05 --solver sph
+
+. ./range.sh
+kind liquid3d 30
+kind obstacles 30
+kind dam-break 16
+kind drops 14
+kind still-tank 10
+kind tilted-tank 10
+kind filling 10
+kind draining 8
+kind held-body 10
+kind film 14
+kind jet 10
+kind space 14
+kind free-fall 3 --dimension 3 --frames 40
+valid liquid3d
+valid obstacles
+valid dam-break
+valid drops
+configs "*3d*.json"
+spent
