@@ -24,6 +24,16 @@ for page in README.md docs/getting-started.md; do
         failed=1
     fi
 done
+number=$((number + 1))
+sed -n '/^```cpp$/,/^```$/p' docs/getting-started.md | grep -v '^```' >"$folder/page.cpp"
+if [ -s "$folder/page.cpp" ] &&
+    c++ -std=c++17 -Wall -Wextra -Wpedantic -Werror -Iinclude -fsyntax-only "$folder/page.cpp" 2>"$folder/err"; then
+    echo "ok $number - the C++ in docs/getting-started.md compiles"
+else
+    echo "not ok $number - the C++ in docs/getting-started.md compiles"
+    sed 's/^/# /' "$folder/err"
+    failed=1
+fi
 # What a newcomer copies is short, and is in a file that the tests build and run.
 for pair in docs/measures.md:tests/test_eval.c docs/stability.md:bench/stability/scenes.c docs/contributing.md:tests/op_scale.c; do
     number=$((number + 1))
