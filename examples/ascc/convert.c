@@ -5,20 +5,22 @@
 #include <string.h>
 #include <sys/stat.h>
 
+#include "arguments.h"
 #include "commands.h"
 #include "console.h"
 #include "host.h"
 #include "published.h"
 #include "tensor_file.h"
 
-static int usage(FILE *out)
+static int usage(void)
 {
-    fprintf(out, "usage: ascc convert IN -o OUT\n\n"
-                 "IN is a published network as examples/convert/convert.py writes it (format\n"
-                 "ascc.weights); OUT becomes a model file with the same weights, for hosts of the\n"
-                 "library. The other commands take published networks as they are.\n"
-                 "A file that is there is replaced, and only by a model that loads.\n");
-    return out == stdout ? 0 : 2;
+    fprintf(stdout,
+            "usage: ascc convert IN -o OUT\n\n"
+            "IN is a published network as examples/convert/convert.py writes it (format\n"
+            "ascc.weights); OUT becomes a model file with the same weights, for hosts of the\n"
+            "library. The other commands take published networks as they are.\n"
+            "A file that is there is replaced, and only by a model that loads.\n");
+    return 0;
 }
 
 static int failed(const char *path, const char *why)
@@ -68,18 +70,19 @@ static int write_model(const char *in, const char *out, const unsigned char *byt
 
 int ascc_command_convert(int argc, char **argv)
 {
+    static const char *const options[] = {"-o", NULL};
     const char *in = NULL, *out = NULL;
     if (argc == 1 && strcmp(argv[0], "--help") == 0)
-        return usage(stdout);
+        return usage();
     for (int i = 0; i < argc; i++)
         if (strcmp(argv[i], "-o") == 0 && i + 1 < argc && !out)
             out = argv[++i];
         else if (argv[i][0] != '-' && !in)
             in = argv[i];
         else
-            return usage(stderr);
+            return ascc_bad_option("convert", options, argv[i], NULL), 2;
     if (!in || !out)
-        return usage(stderr);
+        return ascc_bad_use("convert", "a network and -o FILE are wanted", NULL, NULL), 2;
     if (same_file(in, out))
         return failed(out, "is the network that is to be converted");
     size_t size;

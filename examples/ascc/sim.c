@@ -8,6 +8,7 @@
 #include <string.h>
 #include <unistd.h>
 
+#include "arguments.h"
 #include "commands.h"
 #include "console.h"
 #include "host.h"
@@ -50,11 +51,13 @@ static void usage(FILE *to)
                 "                     two frames, starting from the second\n");
 }
 
+static const char *const option_names[] = {"-n",      "-o",        "--frames",   "--ply",
+                                           "--every", "--threads", "--dt",       "--gravity",
+                                           "--size",  "--spacing", "--velocity", NULL};
+
 static bool bad_use(const char *what, const char *value)
 {
-    ascc_line(stderr, "ascc sim: %s%s%s; ascc sim --help tells more", what, value ? ": " : "",
-              value ? value : "");
-    return false;
+    return ascc_bad_use("sim", what, value, NULL);
 }
 
 /* ---- Arguments ---- */
@@ -133,7 +136,7 @@ static bool read_option(options *o, const char *name, const char *value)
         return o->difference = true;
     if (strcmp(name, "--velocity") == 0)
         return bad_use("--velocity takes stored or difference", value);
-    return bad_use("unknown option", name);
+    return ascc_bad_option("sim", option_names, name, value);
 }
 
 static bool read_arguments(options *o, int argc, char **argv)
@@ -141,7 +144,7 @@ static bool read_arguments(options *o, int argc, char **argv)
     for (int i = 0; i < argc; i++) {
         if (argv[i][0] == '-') {
             if (i + 1 >= argc)
-                return bad_use("a value is missing behind", argv[i]);
+                return ascc_bad_option("sim", option_names, argv[i], NULL);
             if (!read_option(o, argv[i], argv[i + 1]))
                 return false;
             i++;
@@ -160,6 +163,24 @@ static bool read_arguments(options *o, int argc, char **argv)
 
 /* ---- The scene ---- */
 
+/* Adds the scene that was probably meant to an error. */
+static void suggest_scene(const char *scene, char *error, size_t capacity)
+{
+    enum { MOST = 16 };
+    char names[2 * MOST][64];
+    const char *known[2 * MOST + 1] = {NULL};
+    for (size_t i = 0; i < MOST && ascc_scene_names[i].name; i++)
+        for (size_t k = 2 * i; k < 2 * i + 2; k++) {
+            (void)snprintf(names[k], sizeof names[k], "%s-%dd", ascc_scene_names[i].name,
+                           k % 2 ? 3 : 2);
+            known[k] = names[k];
+        }
+    const char *meant = ascc_nearest(scene, known);
+    const size_t length = strlen(error);
+    if (meant)
+        (void)snprintf(error + length, capacity - length, "; did you mean '%s'?", meant);
+}
+
 /* What is no file and is named NAME-2d, NAME-3d or NAME (3D) is a built-in scene. */
 static bool load_scene(const options *o, double spacing, ascc_sequence *scene, char *error,
                        size_t capacity)
@@ -173,9 +194,13 @@ static bool load_scene(const options *o, double spacing, ascc_sequence *scene, c
     bool known = flat || deep;
     for (const ascc_scene_name *s = ascc_scene_names; s->name; s++)
         known = known || strcmp(s->name, name) == 0;
-    if (known && access(o->scene, F_OK) != 0)
-        return ascc_scene_make(name, flat ? 2 : 3, o->size, spacing, scene, error, capacity);
-    return ascc_sequence_read(o->scene, scene, error, capacity);
+    const bool file = access(o->scene, F_OK) == 0;
+    const bool good = known && !file ? ascc_scene_make(name, flat ? 2 : 3, o->size, spacing, scene,
+                                                       error, capacity)
+                                     : ascc_sequence_read(o->scene, scene, error, capacity);
+    if (!good && !file)
+        suggest_scene(o->scene, error, capacity);
+    return good;
 }
 
 /* Positions and velocities that start the run; from differences: frame 1, (frame 1 - frame 0) / dt. */
