@@ -194,11 +194,11 @@ holds 'pictures are whole PNG files' sh -c '
         [ "$(head -c 8 $f | od -An -tx1 | tr -d " ")" = 89504e470d0a1a0a ] &&
             [ "$(tail -c 8 $f | od -An -tx1 | tr -d " ")" = 49454e44ae426082 ] || exit 1
     done'
-holds 'point clouds have 28 bytes a particle behind their header' sh -c '
+holds 'point clouds have 40 bytes a particle behind their header' sh -c '
     for f in ply/*; do
         header=$(sed "/^end_header/q" $f | wc -c)
         head -n 3 $f | tail -n 1 | grep -q "element vertex 32" &&
-            [ $(($(wc -c <$f) - header)) -eq $((32 * 28)) ] || exit 1
+            [ $(($(wc -c <$f) - header)) -eq $((32 * 40)) ] || exit 1
     done'
 
 refuses 1 "; did you mean 'ballistic'?" eval balistic a.safetensors
@@ -267,19 +267,22 @@ done
     early "odd/folder: cannot be written: Is a directory" $long -o odd/folder
     early "odd/file: Not a directory" $long --frames odd/file
     early "odd/fifo: Not a directory" $long --ply odd/fifo
+    early "odd/file: Not a directory" $long --vtk odd/file
 }
 early "odd/folder: cannot be written: Is a directory" eval ballistic a.safetensors --json odd/folder
 early "odd/file: Not a directory" show a.safetensors -o odd/file
 early "odd/fifo: Not a directory" show a.safetensors -o odd/fifo
 early "odd/file: Not a directory" generate wbc2d -o odd/file
 mkdir odd/frames
-mkfifo odd/frames/frame_00000.png odd/frames/frame_00000.ply
+mkfifo odd/frames/frame_00000.png odd/frames/frame_00000.ply odd/frames/walls.vtp
 early "frame_00000.png: cannot be written: it is no regular file" show a.safetensors -o odd/frames
 # shellcheck disable=SC2086
 early "frame_00000.ply: cannot be written: it is no regular file" $long --ply odd/frames
+# shellcheck disable=SC2086
+early "walls.vtp: cannot be written: it is no regular file" $long --vtk odd/frames
 holds 'what stood there stands there' sh -c '
     [ -p odd/fifo ] && { [ -c odd/node ] || [ -p odd/node ]; } && [ -d odd/folder ] && [ "$(cat odd/file)" = text ] &&
-        [ -p odd/frames/frame_00000.png ] && [ "$(ls odd/frames | wc -l)" -eq 2 ]'
+        [ -p odd/frames/frame_00000.png ] && [ "$(ls odd/frames | wc -l)" -eq 3 ]'
 
 ln -s real.safetensors odd/link
 ln -s ../real.json odd/link.json

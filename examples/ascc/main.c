@@ -21,7 +21,8 @@ static const struct {
     {"eval", "measure a method on true sequences", ascc_command_eval},
     {"relax", "give a model file a relaxation", ascc_command_relax},
     {"train", "train a network over rollouts", ascc_command_train},
-    {"convert", "make a model file of a published network", ascc_command_convert},
+    {"convert", "a published network as a model file, a sequence as PLY or VTK",
+     ascc_command_convert},
 };
 
 enum { COMMANDS = sizeof commands / sizeof *commands };

@@ -51,20 +51,6 @@ static bool read_arguments(options *o, int argc, char **argv)
            ascc_bad_use("show", "a SEQUENCE and -o DIR are wanted", NULL, NULL);
 }
 
-/* Velocities of a frame: stored, or the difference to the frame before. */
-static void velocities(const ascc_sequence *s, size_t frame, float *v)
-{
-    const size_t n = s->count * (size_t)s->dimension;
-    if (frame == 0 || s->velocity_frames == s->frames) {
-        memcpy(v, s->velocity + frame * n, n * sizeof *v);
-        return;
-    }
-    for (size_t k = 0; k < n; k++)
-        v[k] = (float)(((double)s->position[frame * n + k] -
-                        (double)s->position[(frame - 1) * n + k]) /
-                       s->time_step);
-}
-
 static bool show(const options *o, const ascc_sequence *s, char *error, size_t capacity)
 {
     if (!ascc_make_folder(o->folder, error, capacity))
@@ -81,7 +67,7 @@ static bool show(const options *o, const ascc_sequence *s, char *error, size_t c
     bool good = true;
     for (size_t f = 0; good && f < s->frames; f += o->every) {
         char path[600], text[96];
-        velocities(s, f, v);
+        ascc_sequence_velocities(s, f, v);
         (void)snprintf(path, sizeof path, "%s/frame_%05zu.png", o->folder, f);
         (void)snprintf(text, sizeof text, "t = %.3f s   frame %zu   %zu particles",
                        (double)f * s->time_step, f, s->count);

@@ -11,15 +11,15 @@
 #include "arguments.h"
 #include "commands.h"
 #include "console.h"
+#include "frames.h"
 #include "host.h"
 #include "new_file.h"
 #include "picture.h"
-#include "ply.h"
 #include "progress.h"
 #include "scenes.h"
 
 typedef struct options {
-    const char *model, *scene, *out, *frames, *ply;
+    const char *model, *scene, *out, *frames, *ply, *vtk;
     int32_t steps, every, threads, size;
     double time_step, spacing;
     int32_t gravity_count; /* 0 = the scene's */
@@ -41,6 +41,7 @@ static void usage(FILE *to)
                 "  -o OUT             a sequence file of all frames\n"
                 "  --frames DIR       one PNG picture a frame\n"
                 "  --ply DIR          one binary PLY file a frame\n"
+                "  --vtk DIR          one VTK file a frame, and frames.pvd for ParaView\n"
                 "  --every K          a frame every K steps (1)\n"
                 "  --threads N        threads to use (1)\n"
                 "  --dt S             time step, seconds (the model's)\n"
@@ -51,9 +52,9 @@ static void usage(FILE *to)
                 "                     two frames, starting from the second\n");
 }
 
-static const char *const option_names[] = {"-n",      "-o",        "--frames",   "--ply",
-                                           "--every", "--threads", "--dt",       "--gravity",
-                                           "--size",  "--spacing", "--velocity", NULL};
+static const char *const option_names[] = {
+    "-n",   "-o",        "--frames", "--ply",     "--vtk",      "--every", "--threads",
+    "--dt", "--gravity", "--size",   "--spacing", "--velocity", NULL};
 
 static bool bad_use(const char *what, const char *value)
 {
@@ -118,6 +119,8 @@ static bool read_option(options *o, const char *name, const char *value)
         return (o->frames = value) != NULL;
     if (strcmp(name, "--ply") == 0)
         return (o->ply = value) != NULL;
+    if (strcmp(name, "--vtk") == 0)
+        return (o->vtk = value) != NULL;
     if (strcmp(name, "--every") == 0)
         return whole(name, value, 1, 100000000, &o->every);
     if (strcmp(name, "--threads") == 0)
@@ -241,6 +244,7 @@ typedef struct simulation {
     ascc_particles *particles;
     ascc_step *step;
     ascc_sequence_writer *writer;
+    ascc_frames exported;
     float *position, *velocity;
     uint64_t *id;
     double time_step;
@@ -280,13 +284,12 @@ static bool write_frame(simulation *s)
                                 s->error, room))
             return false;
     }
-    if (s->o->ply) {
-        (void)snprintf(path, sizeof path, "%s/frame_%05d.ply", s->o->ply, s->steps);
-        if (!ascc_ply_write(path, s->scene.dimension, s->position, s->velocity, s->id,
-                            s->scene.count, s->error, room))
-            return false;
-    }
-    return true;
+    ascc_cloud cloud = {.dimension = s->scene.dimension,
+                        .count = s->scene.count,
+                        .position = s->position,
+                        .velocity = s->velocity,
+                        .id = s->id};
+    return ascc_frames_add(&s->exported, &cloud, s->error, room);
 }
 
 static bool measure(simulation *s, ascc_measures *m)
@@ -474,8 +477,12 @@ static bool open_outputs(simulation *s)
     }
     (void)ascc_particles_get_ids(s->particles, ASCC_FLUID, 0, s->scene.count, s->id);
     s->view = ascc_view_of(&s->scene);
+    s->exported = (ascc_frames){.ply = s->o->ply,
+                                .vtk = s->o->vtk,
+                                .every = (size_t)s->o->every,
+                                .time_step = s->time_step};
     if ((s->o->frames && !ascc_make_folder(s->o->frames, s->error, sizeof s->error)) ||
-        (s->o->ply && !ascc_make_folder(s->o->ply, s->error, sizeof s->error)))
+        !ascc_frames_open(&s->exported, &s->scene, s->error, sizeof s->error))
         return false;
     if (!s->o->out)
         return true;
@@ -528,6 +535,10 @@ int ascc_command_sim(int argc, char **argv)
     }
     if (s.error[0])
         ascc_line(stderr, "ascc sim: %s", s.error);
+    if (!ascc_frames_close(&s.exported, finish, sizeof finish)) {
+        ascc_line(stderr, "ascc sim: %s", finish);
+        good = false;
+    }
     if (interrupted)
         ascc_line(stderr, "ascc sim: interrupted after %d steps", s.steps);
     close_all(&s);
