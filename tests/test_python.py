@@ -81,7 +81,11 @@ class Header(unittest.TestCase):
                     f'printf("{c}.{field} %zu %zu\\n", offsetof({c}, {field}), sizeof((({c} *)0)->{field}));'
                 )
                 wanted.append(f"{c}.{field} {at.offset} {at.size}")
-        for enum, prefix in ((_library.Status, "ASCC_ERROR_"), (_library.Kind, "ASCC_"), (_library.Field, "ASCC_")):
+        for enum, prefix in (
+            (_library.Status, "ASCC_ERROR_"),
+            (_library.Kind, "ASCC_"),
+            (_library.Field, "ASCC_"),
+        ):
             for item in enum:
                 name = "ASCC_OK" if item.name == "OK" else prefix + item.name
                 lines.append(f'printf("{name} %d\\n", {name});')
@@ -89,7 +93,11 @@ class Header(unittest.TestCase):
         with tempfile.TemporaryDirectory() as folder:
             source, program = os.path.join(folder, "p.c"), os.path.join(folder, "p")
             with open(source, "w") as file:
-                file.write("#include <stdio.h>\n#include <ascc/ascc.h>\nint main(void) {\n" + "\n".join(lines) + "\n}\n")
+                file.write(
+                    "#include <stdio.h>\n#include <ascc/ascc.h>\nint main(void) {\n"
+                    + "\n".join(lines)
+                    + "\n}\n"
+                )
             subprocess.run(
                 ["cc", "-I", os.path.join(HERE, "..", "include"), source, "-o", program], check=True
             )
@@ -149,7 +157,10 @@ class Arrays(Case):
         one[:] = 3, 4
         n = 4096  # rows packed behind `one` would lie on the forbidden page
         lattice = ascc.block((0, 0), (64, 64), 0.02)
-        for row in (np.broadcast_to(one, (n, 2)), np.lib.stride_tricks.as_strided(one, (n, 2), (0, 4))):
+        for row in (
+            np.broadcast_to(one, (n, 2)),
+            np.lib.stride_tricks.as_strided(one, (n, 2), (0, 4)),
+        ):
             self.set.clear(FLUID)
             self.set.add_fluid(lattice, velocity=row)
             self.assertTrue(np.allclose(self.set.velocity, (3, 4), atol=1e-6))
@@ -157,7 +168,9 @@ class Arrays(Case):
             np.testing.assert_array_equal(self.set.position, row)
         column = walled((n, 1))
         column[:, 0] = np.arange(n)
-        self.set.set(FLUID, POSITION, np.broadcast_to(column, (n, 2)))  # a component that stands for both
+        self.set.set(
+            FLUID, POSITION, np.broadcast_to(column, (n, 2))
+        )  # a component that stands for both
         np.testing.assert_array_equal(self.set.position[:, 1], np.arange(n))
         mass = walled((1,))
         mass[:] = 2
@@ -174,7 +187,13 @@ class Arrays(Case):
         self.assertFalse(self.set.velocity.any())
         self.set.add_boundary(x, (0, 1))
         np.testing.assert_array_equal(self.set.get(BOUNDARY, NORMAL), np.tile((0, 1), (12, 1)))
-        for wrong in ((1, 2, 3), np.zeros((3, 2)), np.zeros((1, 2)), np.zeros((12, 3)), np.zeros((12, 2, 1))):
+        for wrong in (
+            (1, 2, 3),
+            np.zeros((3, 2)),
+            np.zeros((1, 2)),
+            np.zeros((12, 3)),
+            np.zeros((12, 2, 1)),
+        ):
             with self.assertRaises(ValueError):
                 self.set.add_fluid(x, velocity=wrong)
         for wrong in ((0, 0), np.zeros((12, 3)), 0.0, np.zeros((2, 12))):
@@ -209,7 +228,12 @@ class Arrays(Case):
         ):
             with self.assertRaises(ValueError):
                 self.set.get(FLUID, POSITION, out=wrong)
-        for wrong in (np.empty((4, 2), np.float16), np.empty((4, 2), int), [[0.0, 0.0]] * 4, np.empty((4, 2), ">f4")):
+        for wrong in (
+            np.empty((4, 2), np.float16),
+            np.empty((4, 2), int),
+            [[0.0, 0.0]] * 4,
+            np.empty((4, 2), ">f4"),
+        ):
             with self.assertRaises(TypeError):
                 self.set.get(FLUID, POSITION, out=wrong)
         with self.assertRaises(ValueError):
@@ -332,7 +356,12 @@ class Life(Case):
             self.model.context.close()
             self.model.close()
             step.run(other)
-        for call in (lambda: len(other), lambda: step.run(other), lambda: self.model.info, other.snapshot):
+        for call in (
+            lambda: len(other),
+            lambda: step.run(other),
+            lambda: self.model.info,
+            other.snapshot,
+        ):
             with self.assertRaisesRegex(ValueError, "closed"):
                 call()
         other.close()
@@ -451,7 +480,9 @@ class Scenes(unittest.TestCase):
         corners = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0.0]])
         position, normal = ascc.surface(corners, [[0, 1, 2], [1, 3, 2], [0, 0, 1]], 0.1)
         np.testing.assert_array_equal(normal, np.tile(np.float32([0, 0, 1]), (len(position), 1)))
-        self.assertTrue((position[:, 2] == 0).all() and (position >= 0).all() and (position <= 1).all())
+        self.assertTrue(
+            (position[:, 2] == 0).all() and (position >= 0).all() and (position <= 1).all()
+        )
         probe = np.stack(np.meshgrid(*[np.linspace(0, 1, 41)] * 2, [0]), -1).reshape(-1, 3)
         gap = np.linalg.norm(probe[:, None] - position[None], axis=2).min(1).max()
         self.assertLess(gap, 0.064)

@@ -312,4 +312,6 @@ def version() -> Tuple[int, int, int]:
 
 
 if version()[:2] != VERSION and (VERSION[0] == 0 or version()[:2] < VERSION):
-    raise ImportError("libascc is version %d.%d.%d" % version() + ", this package is for %d.%d" % VERSION)
+    raise ImportError(
+        "libascc is version %d.%d.%d" % version() + ", this package is for %d.%d" % VERSION
+    )

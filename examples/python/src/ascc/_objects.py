@@ -452,7 +452,12 @@ class Particles(_Handle):
         with self._guard:
             self._check(
                 library.particles_set(
-                    self._handle, kind, field, _size(first), len(array), ctypes.byref(borrowed(array))
+                    self._handle,
+                    kind,
+                    field,
+                    _size(first),
+                    len(array),
+                    ctypes.byref(borrowed(array)),
                 )
             )
 
@@ -577,11 +582,11 @@ class Particles(_Handle):
         impulse, torque = (ctypes.c_int64 * 3)(), (ctypes.c_double * 3)()
         with self._guard:
             self.context._check(
-                library.particles_body_impulse(self._handle, _int32("body", body), about, impulse, torque)
+                library.particles_body_impulse(
+                    self._handle, _int32("body", body), about, impulse, torque
+                )
             )
-        return BodyImpulse(
-            (impulse[0], impulse[1], impulse[2]), (torque[0], torque[1], torque[2])
-        )
+        return BodyImpulse((impulse[0], impulse[1], impulse[2]), (torque[0], torque[1], torque[2]))
 
     # The whole state
 
@@ -609,12 +614,12 @@ class Particles(_Handle):
         raw = _library.Measures()
         with self._guard:
             self._check(library.particles_measure(self._handle, ctypes.byref(raw)))
-        values: Dict[str, Any] = {name: getattr(raw, name) for name in Measures.__dataclass_fields__}
+        values: Dict[str, Any] = {
+            name: getattr(raw, name) for name in Measures.__dataclass_fields__
+        }
         for name in ("center", "momentum", "angular_momentum"):
             values[name] = tuple(values[name])
         return Measures(**values)
-
-
 
 
 # ---- Step ----

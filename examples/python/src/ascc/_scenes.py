@@ -50,7 +50,9 @@ def box(
             for c in range(dimension):
                 count = int(np.ceil((high[c] - low[c]) / (PITCH * spacing)))
                 step = (high[c] - low[c]) / count
-                axes.append(np.array([place]) if c == axis else low[c] + (np.arange(count) + 0.5) * step)
+                axes.append(
+                    np.array([place]) if c == axis else low[c] + (np.arange(count) + 0.5) * step
+                )
             side = np.stack(np.meshgrid(*axes, indexing="ij"), -1).reshape(-1, dimension)
             normal = np.zeros_like(side)
             normal[:, axis] = inwards
