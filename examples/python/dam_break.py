@@ -5,7 +5,7 @@ import ascc, matplotlib.pyplot as plt
 # %% A column of water in the corner of a tank.
 model = ascc.Model(sys.argv[1])
 water = ascc.Particles(model)
-water.add_fluid(ascc.block((0, 0), (24, 48), water.spacing))
+water.add_fluid(ascc.block((0.5 * water.spacing,) * 2, (24, 48), water.spacing))
 water.add_boundary(*ascc.box((0, 0), (1.6, 0.9), water.spacing))
 step = ascc.Step(model)
 

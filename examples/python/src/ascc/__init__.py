@@ -3,8 +3,9 @@
 
     model = ascc.Model("examples/models/water2d.safetensors")
     water = ascc.Particles(model)
-    water.add_fluid(ascc.block((0, 0), (20, 40), water.spacing))
-    water.add_boundary(*ascc.box((0, 0), (1, 0.5), water.spacing))
+    h = water.spacing
+    water.add_fluid(ascc.block((h / 2, h / 2), (20, 40), h))
+    water.add_boundary(*ascc.box((0, 0), (1, 0.6), h))
     step = ascc.Step(model)
     step.run(water, 100)
     water.position    # float32[800, 2]

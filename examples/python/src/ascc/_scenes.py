@@ -15,7 +15,8 @@ PITCH = 0.64
 def block(corner: Sequence[float], cells: Sequence[int], spacing: float) -> Points:
     """A lattice of cells[0] x cells[1] (x cells[2]) particles from the block's low corner.
 
-    The first particle is half a spacing inside, so that a block begins where a wall stands.
+    The first particle is half a spacing inside. Begin half a spacing off a wall: a whole one is between
+    them then, which is what the shipped networks keep.
     returns  float32[count, dimension]
     """
     if len(corner) != len(cells) or len(cells) not in (2, 3):
