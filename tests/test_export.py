@@ -563,5 +563,78 @@ class Import(Tool):
             self.refused(self.at("noise.ply"), "--dt", 1, says="noise.ply")
 
 
+class OwnData(Tool):
+    def test_the_way_of_the_page_leads_to_a_network(self):
+        """docs/own-data.md, with tables made of generated water, and six iterations."""
+        folder = os.path.join(self.at("own"), "data")
+        os.makedirs(folder)
+        words = ["generate", "still-column", "--dimension", 2, "--spacing", 0.0125, "--seed", 3]
+        ascc(*words, "--frames", 60, "--count", 2, "--all-velocities", "-o", self.at("generated"))
+        for run in (1, 2):
+            tensors, _ = tensorfile.read(
+                self.at("generated", f"still-column_3_{run - 1:04d}.safetensors")
+            )
+            frames, count, _ = tensors["fluid.position"][::2].shape
+            time = np.repeat(0.005 * np.arange(frames), count)
+            rows = [
+                tensors[name][::2].reshape(-1, 2) for name in ("fluid.position", "fluid.velocity")
+            ]
+            table = np.column_stack([time, np.tile(np.arange(count), frames), *rows])
+            np.savetxt(
+                self.at("own", "run.csv"),
+                table,
+                "%.9g",
+                ",",
+                header="time,id,x,y,vx,vy",
+                comments="",
+            )
+            wall = np.column_stack([tensors["boundary.position"], tensors["boundary.normal"]])
+            np.savetxt(
+                self.at("own", "tank.csv"), wall, "%.9g", ",", header="x,y,nx,ny", comments=""
+            )
+            out = os.path.join(folder, f"run{run}.safetensors")
+            words = [
+                "import",
+                self.at("own", "run.csv"),
+                "--spacing",
+                0.0125,
+                "--walls",
+                self.at("own", "tank.csv"),
+            ]
+            status, err, _ = self.run_tool(*words, "-o", out)
+            self.assertEqual((status, err), (0, ""))
+            told = ascc("lint", out)
+            self.assertRegex(told, r"(?m)^pass .*run\d\.safetensors")
+        with open(os.path.join(HERE, "..", "docs", "own-data.md")) as file:
+            config = re.search(r"```json\n(.*?)```", file.read(), re.S).group(1)
+        with open(self.at("own", "mine.json"), "w") as file:
+            file.write(config)
+        ascc("train", self.at("own", "mine.json"), "--iterations", 6, "--threads", 1)
+        mine, relaxed = self.at("own", "mine-latest.safetensors"), self.at(
+            "own", "relaxed.safetensors"
+        )
+        ascc(
+            "relax",
+            mine if os.path.exists(mine) else self.at("own", "mine.safetensors"),
+            "-o",
+            relaxed,
+        )
+        for method in ("ballistic", "pbf:iterations=4,substeps=4", relaxed):
+            self.assertIn(
+                "err_n1",
+                ascc("eval", method, os.path.join(folder, "run2.safetensors"), "--no-rollout"),
+            )
+        told = ascc(
+            "sim",
+            relaxed,
+            os.path.join(folder, "run2.safetensors"),
+            "-n",
+            3,
+            "--vtk",
+            self.at("own", "frames"),
+        )
+        self.assertRegex(told, r"(?m)^momentum error *0 ")
+
+
 if __name__ == "__main__":
     sys.exit(tap.main(sys.modules[__name__]))
