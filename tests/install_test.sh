@@ -42,8 +42,8 @@ check 'pkg-config and the program agree on the version' pkg_version
 # shellcheck disable=SC2086
 {
     check 'hello.c builds as C99' cc -std=c99 $warnings examples/hello.c -o "$folder/hello" $flags
-    check 'hello.cpp builds as C++11' \
-        c++ -std=c++11 $warnings examples/hello.cpp -o "$folder/hello_cpp" $flags
+    check 'hello.cpp builds as C++17' \
+        c++ -std=c++17 $warnings -Wconversion -Wshadow examples/hello.cpp -o "$folder/hello_cpp" $flags
     printf '#include <ascc/ascc.h>\n' >"$folder/header.c"
     cp "$folder/header.c" "$folder/header.cpp"
     for standard in c99 c11; do
@@ -52,12 +52,24 @@ check 'pkg-config and the program agree on the version' pkg_version
     done
     check 'the header compiles alone as c++11' \
         c++ -std=c++11 $warnings -Wconversion -c "$folder/header.cpp" -o "$folder/header.o" $flags
+    printf '#include <ascc/ascc.hpp>\nint main() { ascc::context c; return c.get() ? 0 : 1; }\n' >"$folder/header.cpp"
+    for compiler in c++ clang++; do
+        command -v $compiler >/dev/null 2>&1 || continue
+        check "ascc.hpp compiles alone as C++17 and C++20 ($compiler)" sh -c '
+            for standard in 17 20; do
+                $0 -std=c++$standard $3 -Wconversion -Wshadow -fsyntax-only "$1" $2 || exit 1
+            done' $compiler "$folder/header.cpp" "$(pkg-config --cflags ascc)" "$warnings"
+    done
     # The demonstration model as a file, written by the public API alone.
     check 'a model is saved through the installed library' sh -c '
         cc -std=c11 "$1/tests/support/save_demo.c" "$1/examples/demo_model.c" -o "$2/save_demo" $3 -lm &&
             "$2/save_demo" 3 "$2/demo3.safetensors" && "$2/save_demo" 2 "$2/demo2.safetensors"' \
         sh "$PWD" "$folder" "$flags"
 }
+# shellcheck disable=SC2086
+check 'ascc.hpp keeps what it promises' sh -c '
+    c++ -std=c++17 -g -fsanitize=address,undefined $3 -Wconversion -Wshadow "$1/tests/test_hpp.cpp" -o "$2/test_hpp" $4 &&
+        "$2/test_hpp" "$2/demo2.safetensors" "$2/demo3.safetensors"' sh "$PWD" "$folder" "$warnings" "$flags"
 # shellcheck disable=SC2046
 check 'learn.c builds as C99 against libascc-train alone' cc -std=c99 $warnings examples/learn.c \
     -o "$folder/learn" $(pkg-config --cflags --libs ascc-train)

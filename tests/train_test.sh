@@ -81,10 +81,10 @@ wrong() {
     config bad.json bad "$2"
     refuses 1 "$1" train bad.json
 }
-refuses 2 'usage: ascc train CONFIG' train
-refuses 2 '--iterations: unknown, or not with this value' train a.json --iterations 0
-refuses 2 '--threads: unknown, or not with this value' train a.json --threads
-refuses 2 '--what: unknown, or not with this value' train a.json --what
+refuses 2 'a CONFIG is wanted' train
+refuses 2 '--iterations 0: no value that it takes' train a.json --iterations 0
+refuses 2 'a value is missing behind: --threads' train a.json --threads
+refuses 2 'unknown option: --what' train a.json --what
 refuses 1 'none.json: No such file' train none.json
 holds 'help is told' sh -c '"$0" train --help | grep -q -e --resume' "$ascc"
 printf '{"network": ' >broken.json

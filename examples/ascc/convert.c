@@ -1,24 +1,32 @@
-/* ascc convert: a published network becomes a model file. SPDX-License-Identifier: MIT */
+/* ascc convert: a published network becomes a model file, a sequence frames for other programs. SPDX-License-Identifier: MIT */
 #include <stdbool.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
 
+#include "arguments.h"
 #include "commands.h"
 #include "console.h"
+#include "export.h"
 #include "host.h"
 #include "published.h"
 #include "tensor_file.h"
 
-static int usage(FILE *out)
+static int usage(void)
 {
-    fprintf(out, "usage: ascc convert IN -o OUT\n\n"
-                 "IN is a published network as examples/convert/convert.py writes it (format\n"
-                 "ascc.weights); OUT becomes a model file with the same weights, for hosts of the\n"
-                 "library. The other commands take published networks as they are.\n"
-                 "A file that is there is replaced, and only by a model that loads.\n");
-    return out == stdout ? 0 : 2;
+    fprintf(stdout,
+            "usage: ascc convert IN -o OUT\n"
+            "       ascc convert SEQUENCE [--ply DIR] [--vtk DIR] [--every K]\n\n"
+            "IN is a published network as examples/convert/convert.py writes it (format\n"
+            "ascc.weights); OUT becomes a model file with the same weights, for hosts of the\n"
+            "library. The other commands take published networks as they are.\n"
+            "A file that is there is replaced, and only by a model that loads.\n\n"
+            "A sequence becomes a file for each K-th frame (1), for other programs:\n"
+            "  --ply DIR  binary PLY\n"
+            "  --vtk DIR  VTK, and frames.pvd for ParaView\n"
+            "  --every K  each K-th frame (1)\n");
+    return 0;
 }
 
 static int failed(const char *path, const char *why)
@@ -66,20 +74,44 @@ static int write_model(const char *in, const char *out, const unsigned char *byt
     return good ? 0 : failed(loaded ? out : in, why);
 }
 
+static bool read_option(const char *name, const char *value, const char **out, ascc_frames *frames)
+{
+    static const char *const options[] = {"-o", "--ply", "--vtk", "--every", NULL};
+    const char **texts[] = {out, &frames->ply, &frames->vtk};
+    for (size_t i = 0; value && i < sizeof texts / sizeof *texts; i++)
+        if (strcmp(name, options[i]) == 0)
+            return (*texts[i] = value) != NULL;
+    if (value && strcmp(name, "--every") == 0) {
+        char *end;
+        const long k = strtol(value, &end, 10);
+        if (!*end && end != value && k >= 1) {
+            frames->every = (size_t)k;
+            return true;
+        }
+    }
+    return ascc_bad_option("convert", options, name, value);
+}
+
 int ascc_command_convert(int argc, char **argv)
 {
     const char *in = NULL, *out = NULL;
+    ascc_frames frames = {.every = 1};
     if (argc == 1 && strcmp(argv[0], "--help") == 0)
-        return usage(stdout);
+        return usage();
     for (int i = 0; i < argc; i++)
-        if (strcmp(argv[i], "-o") == 0 && i + 1 < argc && !out)
-            out = argv[++i];
-        else if (argv[i][0] != '-' && !in)
+        if (argv[i][0] != '-' && !in)
             in = argv[i];
+        else if (!read_option(argv[i], argv[i + 1], &out, &frames)) /* argv ends with NULL */
+            return 2;
         else
-            return usage(stderr);
+            i++;
+    const bool exports = frames.ply || frames.vtk;
+    if (in && exports && !out)
+        return ascc_export(in, &frames);
+    if (exports)
+        return ascc_bad_use("convert", "one SEQUENCE is wanted, and no -o", NULL, NULL), 2;
     if (!in || !out)
-        return usage(stderr);
+        return ascc_bad_use("convert", "a network and -o FILE are wanted", NULL, NULL), 2;
     if (same_file(in, out))
         return failed(out, "is the network that is to be converted");
     size_t size;

@@ -7,7 +7,9 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
 
+#include "arguments.h"
 #include "commands.h"
 #include "console.h"
 #include "evaluate.h"
@@ -25,14 +27,14 @@ typedef struct options {
     bool quiet;
 } options;
 
-static int usage(FILE *file)
+static int usage(void)
 {
-    fputs("ascc eval METHOD SEQUENCE... [options]\n"
+    fputs("usage: ascc eval METHOD SEQUENCE... [options]\n"
           "  Runs METHOD on true sequences (docs/measures.md says what is measured).\n\n"
           "METHOD\n",
-          file);
+          stdout);
     for (size_t k = 0; ascc_methods[k]; k++)
-        fprintf(file, "  %s\n", ascc_methods[k]->help);
+        fprintf(stdout, "  %s\n", ascc_methods[k]->help);
     fputs("\noptions\n"
           "  --every K          take each K-th frame of the sequences (1)\n"
           "  --threads N        threads to use (1); numbers do not depend on it\n"
@@ -43,8 +45,8 @@ static int usage(FILE *file)
           "  --transport        earth mover's distances of the last frame too: minutes\n"
           "  --no-rollout       one- and two-frame errors only\n"
           "  --quiet            no table\n",
-          file);
-    return file == stdout ? 0 : 2;
+          stdout);
+    return 0;
 }
 
 static bool read_long(const char *text, long least, long *value)
@@ -87,6 +89,9 @@ static bool read_option(const char *name, const char *value, options *o)
 
 static bool read_arguments(int argc, char **argv, options *o)
 {
+    static const char *const names[] = {"--every",  "--threads",  "--json",      "--csv",
+                                        "--frames", "--velocity", "--transport", "--no-rollout",
+                                        "--quiet",  NULL};
     for (int i = 0; i < argc; i++) {
         if (strcmp(argv[i], "--transport") == 0)
             o->measure.transport = true;
@@ -94,18 +99,19 @@ static bool read_arguments(int argc, char **argv, options *o)
             o->quiet = true;
         else if (strcmp(argv[i], "--no-rollout") == 0)
             o->measure.no_rollout = true;
-        else if (strncmp(argv[i], "--", 2) == 0) {
-            if (i + 1 == argc || !read_option(argv[i], argv[i + 1], o)) {
-                ascc_line(stderr, "ascc eval: %s: unknown, or not with this value", argv[i]);
-                return false;
-            }
+        else if (argv[i][0] == '-') {
+            if (i + 1 == argc || !read_option(argv[i], argv[i + 1], o))
+                return ascc_bad_option("eval", names, argv[i], argv[i + 1]);
             i++;
         } else if (!o->method)
             o->method = argv[i];
         else if (o->sequence_count < MOST_SEQUENCES)
             o->sequence[o->sequence_count++] = argv[i];
+        else
+            return ascc_bad_use("eval", "one sequence too many", argv[i], NULL);
     }
-    return o->method && o->sequence_count;
+    return (o->method && o->sequence_count) ||
+           ascc_bad_use("eval", "a METHOD and a SEQUENCE are wanted", NULL, NULL);
 }
 
 /* "some/folder/name.safetensors" is called "folder/name". */
@@ -146,13 +152,28 @@ static bool check_reports(const options *o)
     return good;
 }
 
+/* What a run failed of. A word that is no method's is a model's: where there is none, the method that was
+ * probably meant is told. */
+static void print_failure(const char *sequence, const ascc_method *method, const char *word,
+                          const char *why)
+{
+    enum { MOST = 16 };
+    const char *known[MOST + 2] = {"demo"}, *meant = NULL;
+    for (size_t k = 0; k < MOST && ascc_methods[k]; k++)
+        known[k + 1] = ascc_methods[k]->prefix;
+    if (!method->prefix[0] && access(word, F_OK) != 0)
+        meant = ascc_nearest(word, known);
+    ascc_line(stderr, "ascc eval: %s: %s%s%s%s", sequence, why, meant ? "; did you mean '" : "",
+              meant ? meant : "", meant ? "'?" : "");
+}
+
 int ascc_command_eval(int argc, char **argv)
 {
     options o = {.threads = 1, .every = 1, .measure.velocity = -1};
-    if (argc > 0 && (strcmp(argv[0], "--help") == 0 || strcmp(argv[0], "-h") == 0))
-        return usage(stdout);
+    if (argc == 1 && strcmp(argv[0], "--help") == 0)
+        return usage();
     if (!read_arguments(argc, argv, &o))
-        return usage(stderr);
+        return 2;
     const char *settings;
     const ascc_method *method = ascc_method_find(o.method, &settings);
     if (!method) {
@@ -167,14 +188,17 @@ int ascc_command_eval(int argc, char **argv)
         ascc_truth t;
         ascc_method_error error = {""};
         name_sequence(o.sequence[k], runs[k].sequence, sizeof runs[k].sequence);
-        fine = ascc_truth_load(o.sequence[k], o.threads, &t, &error);
+        const bool loaded = ascc_truth_load(o.sequence[k], o.threads, &t, &error);
+        fine = loaded;
         if (fine) {
             ascc_truth_thin(&t, o.every);
             fine = ascc_evaluate(&o.measure, method, settings, &t, &runs[k], &error);
             ascc_truth_free(&t);
         }
-        if (!fine)
-            ascc_line(stderr, "ascc eval: %s: %s", o.sequence[k], error.text);
+        if (!fine && loaded)
+            print_failure(o.sequence[k], method, o.method, error.text);
+        else if (!fine)
+            ascc_line(stderr, "ascc eval: %s", error.text); /* has the path */
     }
     fine = fine && write_reports(&o, runs);
     free(runs);

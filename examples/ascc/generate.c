@@ -6,6 +6,7 @@
 #include <string.h>
 #include <sys/stat.h>
 
+#include "arguments.h"
 #include "commands.h"
 #include "console.h"
 #include "flow.h"
@@ -30,10 +31,10 @@ typedef struct job {
     ascc_progress progress;
 } job;
 
-static void usage(FILE *out)
+static void usage(void)
 {
     fprintf(
-        out,
+        stdout,
         "usage: ascc generate KIND -o DIR [--seed S] [--count N] [--threads T] [--frames F]\n"
         "                     [--dimension 2|3] [--spacing METRES] [--all-velocities]\n"
         "                     [--solver dfsph|sph] [--frame SECONDS] [--gravity TIMES]\n\n"
@@ -43,7 +44,7 @@ static void usage(FILE *out)
         "compressible SPH. --frame is the time between frames, --gravity a factor of the "
         "kind's.\n\n");
     for (size_t k = 0; recipe_kinds[k][0]; k++)
-        fprintf(out, "  %-13s %s\n", recipe_kinds[k][0], recipe_kinds[k][1]);
+        fprintf(stdout, "  %-13s %s\n", recipe_kinds[k][0], recipe_kinds[k][1]);
 }
 
 /* ---- One sequence ---- */
@@ -251,7 +252,7 @@ static bool take_option(request *q, const char *name, const char *value)
     return false;
 }
 
-static bool known(const char *kind)
+static bool is_known(const char *kind)
 {
     for (size_t k = 0; recipe_kinds[k][0]; k++)
         if (strcmp(recipe_kinds[k][0], kind) == 0)
@@ -259,12 +260,24 @@ static bool known(const char *kind)
     return false;
 }
 
+static void unknown_kind(const char *kind)
+{
+    enum { MOST = 32 };
+    const char *known[MOST + 1] = {NULL};
+    for (size_t k = 0; k < MOST && recipe_kinds[k][0]; k++)
+        known[k] = recipe_kinds[k][0];
+    (void)ascc_bad_use("generate", "there is no such kind", kind, known);
+}
+
 int ascc_command_generate(int argc, char **argv)
 {
+    static const char *const options[] = {"-o",        "--seed",           "--count",
+                                          "--threads", "--frames",         "--dimension",
+                                          "--spacing", "--all-velocities", NULL};
     request q = {.count = 1, .threads = 1};
     for (int i = 0; i < argc; i++) {
         if (strcmp(argv[i], "--help") == 0) {
-            usage(stdout);
+            usage();
             return 0;
         }
         if (strcmp(argv[i], "--all-velocities") == 0) {
@@ -272,24 +285,18 @@ int ascc_command_generate(int argc, char **argv)
         } else if (argv[i][0] != '-' && !q.kind) {
             q.kind = argv[i];
         } else if (i + 1 >= argc || !take_option(&q, argv[i], argv[i + 1])) {
-            ascc_line(stderr, "ascc generate: '%s' is no option, or its value is wrong", argv[i]);
-            return 2;
+            return ascc_bad_option("generate", options, argv[i], argv[i + 1]), 2;
         } else {
             i++;
         }
     }
-    if (!q.kind || !known(q.kind) || !q.directory) {
-        ascc_line(stderr, "ascc generate: %s%s",
-                  !q.kind          ? "no KIND given"
-                  : !known(q.kind) ? "there is no kind "
-                                   : "no -o DIR",
-                  q.kind && !known(q.kind) ? q.kind : "");
-        usage(stderr);
-        return 2;
-    }
+    if (!q.kind || !q.directory)
+        return ascc_bad_use("generate", "a KIND and -o DIR are wanted", NULL, NULL), 2;
+    if (!is_known(q.kind))
+        return unknown_kind(q.kind), 2;
     recipe probe;
-    const recipe_options options = q.recipe;
-    if (recipe_make(q.kind, &options, &probe) != ASCC_OK) {
+    const recipe_options probed = q.recipe;
+    if (recipe_make(q.kind, &probed, &probe) != ASCC_OK) {
         ascc_line(stderr, "ascc generate: %s does not come in that dimension or spacing", q.kind);
         return 2;
     }

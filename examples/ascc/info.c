@@ -1,11 +1,15 @@
 /* ascc info: what is in a model or sequence file. SPDX-License-Identifier: MIT */
 #include <math.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
 
+#include "arguments.h"
 #include "commands.h"
 #include "console.h"
 #include "host.h"
+#include "tensor_file.h"
 
 static void print_model(const char *path, const ascc_model_info *m)
 {
@@ -50,37 +54,80 @@ static void print_sequence(const char *path, const ascc_sequence *s)
         ascc_line(stdout, "  source            %.160s", s->source);
 }
 
-int ascc_command_info(int argc, char **argv)
+/* What a file says that it is. */
+static bool read_format(const char *path, char *format, size_t capacity, char *why, size_t room)
 {
-    if (argc != 1 || strcmp(argv[0], "--help") == 0) {
-        fprintf(argc == 1 ? stdout : stderr, "usage: ascc info FILE\n\n"
-                                             "FILE is a model file, a published network "
-                                             "or a sequence file.\n");
-        return argc == 1 ? 0 : 2;
-    }
+    size_t size, data;
+    unsigned char *bytes = ascc_tensor_file_read(path, &size, why, room);
+    if (!bytes)
+        return false;
+    char reason[256] = "";
+    json_t *header = ascc_tensor_file_header(bytes, size, &data, reason, sizeof reason);
+    const char *said = header ? ascc_tensor_file_metadata(header, "format") : NULL;
+    (void)snprintf(format, capacity, "%s", said ? said : "");
+    const bool known = strcmp(format, "ascc.sequence") == 0 || strcmp(format, "ascc.model") == 0 ||
+                       strcmp(format, "ascc.weights") == 0;
+    if (!header)
+        (void)snprintf(why, room, "neither a model nor a sequence: %s", reason);
+    else if (!known)
+        (void)snprintf(why, room, "neither a model nor a sequence: its format is '%s'", format);
+    json_decref(header);
+    free(bytes);
+    return known;
+}
+
+static int describe_sequence(const char *path)
+{
     ascc_sequence sequence;
     char error[512];
-    if (ascc_sequence_read(argv[0], &sequence, error, sizeof error)) {
-        print_sequence(argv[0], &sequence);
-        ascc_sequence_free(&sequence);
-        return 0;
+    if (!ascc_sequence_read(path, &sequence, error, sizeof error)) {
+        ascc_line(stderr, "ascc info: %s", error);
+        return 1;
     }
+    print_sequence(path, &sequence);
+    ascc_sequence_free(&sequence);
+    return 0;
+}
+
+static int describe_model(const char *path)
+{
     ascc_context *context = NULL;
     ascc_model *model = NULL;
     ascc_host_error why = {""};
+    ascc_model_info info = {.size = sizeof info};
     ascc_status status = ascc_context_create(NULL, &context);
     if (status == ASCC_OK)
-        status = ascc_host_load(context, argv[0], &model, &why);
-    if (status == ASCC_OK) {
-        ascc_model_info info = {.size = sizeof info};
+        status = ascc_host_load(context, path, &model, &why);
+    if (status == ASCC_OK)
         status = ascc_model_get_info(model, &info);
-        if (status == ASCC_OK)
-            print_model(argv[0], &info);
-    } else {
-        ascc_host_complain("neither a model nor a sequence", status, why.text);
-        ascc_line(stderr, "ascc: read as a sequence: %s", error);
-    }
+    if (status == ASCC_OK)
+        print_model(path, &info);
+    else
+        ascc_host_complain(path, status, why.text);
     ascc_model_destroy(&model);
     ascc_context_destroy(&context);
     return status == ASCC_OK ? 0 : 1;
+}
+
+int ascc_command_info(int argc, char **argv)
+{
+    if (argc == 1 && strcmp(argv[0], "--help") == 0) {
+        fputs("usage: ascc info FILE\n\n"
+              "FILE is a model file, a published network or a sequence file.\n",
+              stdout);
+        return 0;
+    }
+    if (argc != 1)
+        return ascc_bad_use("info", "one FILE is wanted", NULL, NULL), 2;
+    if (argv[0][0] == '-')
+        return ascc_bad_use("info", "unknown option", argv[0], NULL), 2;
+    char format[64] = "", why[512];
+    if (access(argv[0], F_OK) != 0)
+        return describe_model(argv[0]); /* which tells the reason */
+    if (!read_format(argv[0], format, sizeof format, why, sizeof why)) {
+        ascc_line(stderr, "ascc info: %s: %s", argv[0], why);
+        return 1;
+    }
+    return strcmp(format, "ascc.sequence") == 0 ? describe_sequence(argv[0])
+                                                : describe_model(argv[0]);
 }

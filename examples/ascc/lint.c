@@ -3,15 +3,16 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "arguments.h"
 #include "commands.h"
 #include "console.h"
 #include "inspect.h"
 #include "sequence.h"
 
-static void usage(FILE *out)
+static void usage(void)
 {
     fprintf(
-        out,
+        stdout,
         "usage: ascc lint [--speed X] [--clump X] [--worst X] FILE...\n\n"
         "Rejects sequences with values that are not finite, spikes, escapes or clumps.\n"
         "  --speed X  times the speed that the fluid can reach (start and fall)   (default 5)\n"
@@ -24,7 +25,17 @@ static void usage(FILE *out)
         "Exit status: 0 all pass, 1 some do not, 2 wrong usage or unreadable file.\n");
 }
 
-static bool lint_file(const char *path, const inspect_limits *limits, bool *unreadable)
+/* Above the first line of the table. */
+static void print_heading(bool *printed)
+{
+    if (!*printed)
+        ascc_line(stdout, "       speed /reach spike  out  near mean, worst  clump mean, worst  "
+                          "density, top");
+    *printed = true;
+}
+
+static bool lint_file(const char *path, const inspect_limits *limits, bool *heading,
+                      bool *unreadable)
 {
     ascc_sequence s;
     char error[256];
@@ -48,10 +59,13 @@ static bool lint_file(const char *path, const inspect_limits *limits, bool *unre
     const ascc_status status = inspect(&input, limits, &f);
     ascc_sequence_free(&s);
     if (status != ASCC_OK) {
-        ascc_line(stderr, "ascc lint: %s: %s", path, ascc_status_text(status));
+        ascc_line(stderr, "ascc lint: %s: %s", path,
+                  status == ASCC_ERROR_RANGE ? "a position is too far out to have neighbours"
+                                             : ascc_status_text(status));
         *unreadable = true;
         return false;
     }
+    print_heading(heading);
     ascc_line(stdout, "%-6s %5.2f %5.2f %5zu %5zu  %.4f %.4f  %.4f %.4f  %.3f %.3f  %s%s%s",
               f.verdict ? "reject" : "pass", f.fastest, f.reach > 0.0 ? f.fastest / f.reach : 0.0,
               f.spikes, f.escapes, f.pair_mean, f.pair_worst, f.clump_mean, f.clump_worst,
@@ -64,32 +78,28 @@ int ascc_command_lint(int argc, char **argv)
 {
     inspect_limits limits = {0};
     int first = 0;
-    for (; first < argc && strncmp(argv[first], "--", 2) == 0; first += 2) {
+    for (; first < argc && argv[first][0] == '-'; first += 2) {
         double *value = strcmp(argv[first], "--speed") == 0   ? &limits.speed
                         : strcmp(argv[first], "--clump") == 0 ? &limits.clump
                         : strcmp(argv[first], "--worst") == 0 ? &limits.worst
                                                               : NULL;
         if (strcmp(argv[first], "--help") == 0) {
-            usage(stdout);
+            usage();
             return 0;
         }
         char *end = NULL;
         if (value && first + 1 < argc)
             *value = strtod(argv[first + 1], &end);
         if (!end || *end || !(*value > 0.0)) {
-            ascc_line(stderr, "ascc lint: %s needs a positive number", argv[first]);
-            usage(stderr);
-            return 2;
+            static const char *const options[] = {"--speed", "--clump", "--worst", NULL};
+            return ascc_bad_option("lint", options, argv[first], argv[first + 1]), 2;
         }
     }
     if (first >= argc) {
-        usage(stderr);
-        return 2;
+        return ascc_bad_use("lint", "a FILE is wanted", NULL, NULL), 2;
     }
-    bool good = true, unreadable = false;
-    ascc_line(stdout,
-              "       speed /reach spike  out  near mean, worst  clump mean, worst  density, top");
+    bool good = true, heading = false, unreadable = false;
     for (int i = first; i < argc; i++)
-        good &= lint_file(argv[i], &limits, &unreadable);
+        good &= lint_file(argv[i], &limits, &heading, &unreadable);
     return unreadable ? 2 : good ? 0 : 1;
 }

@@ -1,9 +1,11 @@
 /* The ascc program: picks the subcommand. SPDX-License-Identifier: MIT */
+#include <stdbool.h>
 #include <stdio.h>
 #include <string.h>
 
 #include <ascc/ascc.h>
 
+#include "arguments.h"
 #include "commands.h"
 #include "console.h"
 
@@ -19,31 +21,70 @@ static const struct {
     {"eval", "measure a method on true sequences", ascc_command_eval},
     {"relax", "give a model file a relaxation", ascc_command_relax},
     {"train", "train a network over rollouts", ascc_command_train},
-    {"convert", "make a model file of a published network", ascc_command_convert},
+    {"convert", "a published network as a model file, a sequence as PLY or VTK",
+     ascc_command_convert},
 };
+
+enum { COMMANDS = sizeof commands / sizeof *commands };
 
 static void usage(FILE *out)
 {
     fprintf(out, "usage: ascc COMMAND ...\n\n");
-    for (size_t i = 0; i < sizeof commands / sizeof *commands; i++)
+    for (size_t i = 0; i < COMMANDS; i++)
         fprintf(out, "  %-10s %s\n", commands[i].name, commands[i].text);
     fprintf(out, "  %-10s print the version\n\nascc COMMAND --help tells more.\n", "version");
+}
+
+static bool is_help(const char *word)
+{
+    return strcmp(word, "--help") == 0 || strcmp(word, "-h") == 0;
+}
+
+/* Wherever it stands: who asks for help wants nothing else. */
+static bool wants_help(int argc, char **argv)
+{
+    for (int i = 0; i < argc; i++)
+        if (is_help(argv[i]))
+            return true;
+    return false;
+}
+
+static int unknown(const char *name)
+{
+    const char *names[COMMANDS + 3] = {"help", "version"};
+    char what[96];
+    for (size_t i = 0; i < COMMANDS; i++)
+        names[i + 2] = commands[i].name;
+    (void)snprintf(what, sizeof what, "'%.64s' is no %s", name,
+                   name[0] == '-' ? "option" : "command");
+    const char *meant = ascc_nearest(name, names);
+    if (meant)
+        ascc_line(stderr, "ascc: %s; did you mean '%s'?", what, meant);
+    else
+        ascc_line(stderr, "ascc: %s; ascc --help tells more", what);
+    return 2;
 }
 
 static int run(int argc, char **argv)
 {
     const char *name = argc > 1 ? argv[1] : "";
-    for (size_t i = 0; i < sizeof commands / sizeof *commands; i++)
-        if (strcmp(name, commands[i].name) == 0)
-            return commands[i].run(argc - 2, argv + 2);
-    if (strcmp(name, "version") == 0 || strcmp(name, "--version") == 0) {
+    const bool help = strcmp(name, "help") == 0 || is_help(name);
+    static char help_word[] = "--help";
+    char *help_words[] = {help_word, NULL};
+    const char *command = help && argc > 2 && !is_help(argv[2]) ? argv[2] : name;
+    for (size_t i = 0; i < COMMANDS; i++)
+        if (strcmp(command, commands[i].name) == 0)
+            return help || wants_help(argc - 2, argv + 2) ? commands[i].run(1, help_words)
+                                                          : commands[i].run(argc - 2, argv + 2);
+    if (command != name)
+        return unknown(command);
+    if (strcmp(name, "version") == 0 || strcmp(name, "--version") == 0 || strcmp(name, "-V") == 0) {
         const int32_t v = ascc_version();
         ascc_line(stdout, "ascc %d.%d.%d", v / 10000, v / 100 % 100, v % 100);
         return 0;
     }
-    const int help = strcmp(name, "help") == 0 || strcmp(name, "--help") == 0;
     if (!help && argc > 1)
-        ascc_line(stderr, "ascc: '%s' is no command", name);
+        return unknown(name);
     usage(help ? stdout : stderr);
     return help ? 0 : 2;
 }

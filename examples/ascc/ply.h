@@ -3,12 +3,11 @@
 #define ASCC_PLY_H
 
 #include <stdbool.h>
-#include <stddef.h>
-#include <stdint.h>
 
-/* x y z vx vy vz as float and id as uint, little-endian; z is 0 in 2D. */
-bool ascc_ply_write(const char *path, int32_t dimension, const float *position,
-                    const float *velocity, const uint64_t *id, size_t count, char *error,
-                    size_t capacity);
+#include "cloud.h"
+
+/* x y z nx ny nz vx vy vz as float and id as uint, little-endian; third components are 0 in 2D. The velocity
+ * stands twice: VTK reads of all properties only nx ny nz (as normals), others read vx vy vz by name. */
+bool ascc_ply_write(const char *path, const ascc_cloud *cloud, char *error, size_t capacity);
 
 #endif

@@ -13,6 +13,7 @@
 
 #include <ascc/ascc.h>
 
+#include "arguments.h"
 #include "commands.h"
 #include "console.h"
 #include "tensor_file.h"
@@ -32,8 +33,8 @@ typedef struct relax {
 } relax;
 
 static const char help[] =
-    "ascc relax MODEL -o FILE [options]\n"
-    "ascc relax --new DIMENSION --spacing M --dt S -o FILE [options]\n"
+    "usage: ascc relax MODEL -o FILE [options]\n"
+    "       ascc relax --new DIMENSION --spacing M --dt S -o FILE [options]\n"
     "  Writes MODEL with a relaxation after its network (docs/file-format.md), in place of one "
     "that it\n"
     "  has; or a model that is a relaxation alone.\n"
@@ -117,6 +118,11 @@ static bool read_option(relax *r, const char *name, const char *value)
 
 static bool read_arguments(relax *r, int argc, char **argv)
 {
+    static const char *const options[] = {"--spacing", "--dt",    "--support",    "--volume",
+                                          "--epsilon", "--limit", "--repulsion",  "--stiffness",
+                                          "--contact", "--omega", "--divergence", "--new",
+                                          "--name",    "-o",      "--none",       "--current",
+                                          NULL};
     for (int i = 0; i < argc; i++) {
         if (strcmp(argv[i], "--none") == 0) {
             r->none = true;
@@ -125,19 +131,16 @@ static bool read_arguments(relax *r, int argc, char **argv)
         } else if (argv[i][0] != '-' && !r->model) {
             r->model = argv[i];
         } else if (i + 1 == argc || !read_option(r, argv[i], argv[i + 1])) {
-            ascc_line(stderr, "ascc relax: '%s' is not understood", argv[i]);
-            return false;
+            return ascc_bad_option("relax", options, argv[i], argv[i + 1]);
         } else {
             i++;
         }
     }
     const bool new = r->dimension && !r->model && r->spacing > 0.0 && r->time_step > 0.0;
-    if (!r->output || (!new && (!r->model || r->dimension))) {
-        fprintf(stderr,
-                "ascc relax: a model, or --new with --spacing and --dt, and -o are wanted\n");
-        return false;
-    }
-    return true;
+    const bool whole = r->output && (new || (r->model && !r->dimension));
+    return whole ||
+           ascc_bad_use("relax", "a model, or --new with --spacing and --dt, and -o are wanted",
+                        NULL, NULL);
 }
 
 /* ---- Descriptions ---- */
@@ -278,10 +281,8 @@ int ascc_command_relax(int argc, char **argv)
                .repulsion = 0.25,
                .stiffness = 0.5,
                .contact = 0.4};
-    if (!read_arguments(&r, argc, argv)) {
-        fputs(help, stderr);
+    if (!read_arguments(&r, argc, argv))
         return 2;
-    }
     size_t size = 0;
     unsigned char *bytes = change(&r, &size);
     const int status = bytes ? write_model(&r, bytes, size) : 1;

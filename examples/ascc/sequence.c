@@ -215,6 +215,19 @@ void ascc_sequence_free(ascc_sequence *sequence)
     memset(sequence, 0, sizeof *sequence);
 }
 
+void ascc_sequence_velocities(const ascc_sequence *s, size_t frame, float *velocity)
+{
+    const size_t n = s->count * (size_t)s->dimension;
+    if (frame == 0 || s->velocity_frames == s->frames) {
+        memcpy(velocity, s->velocity + frame * n, n * sizeof *velocity);
+        return;
+    }
+    for (size_t k = 0; k < n; k++)
+        velocity[k] = (float)(((double)s->position[frame * n + k] -
+                               (double)s->position[(frame - 1) * n + k]) /
+                              s->time_step);
+}
+
 /* ---- Writing ---- */
 
 struct ascc_sequence_writer {

@@ -28,6 +28,9 @@ typedef struct ascc_sequence {
 bool ascc_sequence_read(const char *path, ascc_sequence *sequence, char *error, size_t capacity);
 void ascc_sequence_free(ascc_sequence *sequence);
 
+/* Velocities of a frame, [count][dimension]: stored, or the difference to the frame before. */
+void ascc_sequence_velocities(const ascc_sequence *sequence, size_t frame, float *velocity);
+
 /* Writes into PATH.part, which takes the file's name only when it is whole. */
 typedef struct ascc_sequence_writer ascc_sequence_writer;
 

@@ -3,6 +3,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "arguments.h"
 #include "commands.h"
 #include "console.h"
 #include "new_file.h"
@@ -14,45 +15,40 @@ typedef struct options {
     size_t every;
 } options;
 
-static int usage(FILE *to)
+static int usage(void)
 {
-    fprintf(to, "usage: ascc show SEQUENCE -o DIR [--every K]\n\n"
-                "Writes every K-th frame (1) as a PNG picture.\n");
-    return to == stdout ? 0 : 2;
+    fprintf(stdout, "usage: ascc show SEQUENCE -o DIR [--every K]\n\n"
+                    "Writes every K-th frame (1) as a PNG picture.\n");
+    return 0;
+}
+
+static bool read_option(options *o, const char *name, const char *value)
+{
+    static const char *const names[] = {"-o", "--every", NULL};
+    char *end = NULL;
+    if (value && strcmp(name, "-o") == 0)
+        return (o->folder = value) != NULL;
+    if (value && strcmp(name, "--every") == 0) {
+        const long k = strtol(value, &end, 10);
+        if (!*end && end != value && k >= 1) {
+            o->every = (size_t)k;
+            return true;
+        }
+    }
+    return ascc_bad_option("show", names, name, value);
 }
 
 static bool read_arguments(options *o, int argc, char **argv)
 {
-    for (int i = 0; i < argc; i++) {
-        if (argv[i][0] != '-' && !o->sequence) {
+    for (int i = 0; i < argc; i++)
+        if (argv[i][0] != '-' && !o->sequence)
             o->sequence = argv[i];
-        } else if (strcmp(argv[i], "-o") == 0 && i + 1 < argc) {
-            o->folder = argv[++i];
-        } else if (strcmp(argv[i], "--every") == 0 && i + 1 < argc) {
-            char *end;
-            const long k = strtol(argv[++i], &end, 10);
-            if (*end || end == argv[i] || k < 1)
-                return false;
-            o->every = (size_t)k;
-        } else {
+        else if (!read_option(o, argv[i], argv[i + 1])) /* argv ends with NULL */
             return false;
-        }
-    }
-    return o->sequence && o->folder;
-}
-
-/* Velocities of a frame: stored, or the difference to the frame before. */
-static void velocities(const ascc_sequence *s, size_t frame, float *v)
-{
-    const size_t n = s->count * (size_t)s->dimension;
-    if (frame == 0 || s->velocity_frames == s->frames) {
-        memcpy(v, s->velocity + frame * n, n * sizeof *v);
-        return;
-    }
-    for (size_t k = 0; k < n; k++)
-        v[k] = (float)(((double)s->position[frame * n + k] -
-                        (double)s->position[(frame - 1) * n + k]) /
-                       s->time_step);
+        else
+            i++;
+    return (o->sequence && o->folder) ||
+           ascc_bad_use("show", "a SEQUENCE and -o DIR are wanted", NULL, NULL);
 }
 
 static bool show(const options *o, const ascc_sequence *s, char *error, size_t capacity)
@@ -71,7 +67,7 @@ static bool show(const options *o, const ascc_sequence *s, char *error, size_t c
     bool good = true;
     for (size_t f = 0; good && f < s->frames; f += o->every) {
         char path[600], text[96];
-        velocities(s, f, v);
+        ascc_sequence_velocities(s, f, v);
         (void)snprintf(path, sizeof path, "%s/frame_%05zu.png", o->folder, f);
         (void)snprintf(text, sizeof text, "t = %.3f s   frame %zu   %zu particles",
                        (double)f * s->time_step, f, s->count);
@@ -88,9 +84,9 @@ int ascc_command_show(int argc, char **argv)
 {
     options o = {.every = 1};
     if (argc == 1 && strcmp(argv[0], "--help") == 0)
-        return usage(stdout);
+        return usage();
     if (!read_arguments(&o, argc, argv))
-        return usage(stderr);
+        return 2;
     ascc_sequence s;
     char error[768];
     if (!ascc_sequence_read(o.sequence, &s, error, sizeof error)) {

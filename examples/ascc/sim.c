@@ -8,17 +8,18 @@
 #include <string.h>
 #include <unistd.h>
 
+#include "arguments.h"
 #include "commands.h"
 #include "console.h"
+#include "frames.h"
 #include "host.h"
 #include "new_file.h"
 #include "picture.h"
-#include "ply.h"
 #include "progress.h"
 #include "scenes.h"
 
 typedef struct options {
-    const char *model, *scene, *out, *frames, *ply;
+    const char *model, *scene, *out, *frames, *ply, *vtk;
     int32_t steps, every, threads, size;
     double time_step, spacing;
     int32_t gravity_count; /* 0 = the scene's */
@@ -40,6 +41,7 @@ static void usage(FILE *to)
                 "  -o OUT             a sequence file of all frames\n"
                 "  --frames DIR       one PNG picture a frame\n"
                 "  --ply DIR          one binary PLY file a frame\n"
+                "  --vtk DIR          one VTK file a frame, and frames.pvd for ParaView\n"
                 "  --every K          a frame every K steps (1)\n"
                 "  --threads N        threads to use (1)\n"
                 "  --dt S             time step, seconds (the model's)\n"
@@ -50,11 +52,13 @@ static void usage(FILE *to)
                 "                     two frames, starting from the second\n");
 }
 
+static const char *const option_names[] = {
+    "-n",   "-o",        "--frames", "--ply",     "--vtk",      "--every", "--threads",
+    "--dt", "--gravity", "--size",   "--spacing", "--velocity", NULL};
+
 static bool bad_use(const char *what, const char *value)
 {
-    ascc_line(stderr, "ascc sim: %s%s%s; ascc sim --help tells more", what, value ? ": " : "",
-              value ? value : "");
-    return false;
+    return ascc_bad_use("sim", what, value, NULL);
 }
 
 /* ---- Arguments ---- */
@@ -115,6 +119,8 @@ static bool read_option(options *o, const char *name, const char *value)
         return (o->frames = value) != NULL;
     if (strcmp(name, "--ply") == 0)
         return (o->ply = value) != NULL;
+    if (strcmp(name, "--vtk") == 0)
+        return (o->vtk = value) != NULL;
     if (strcmp(name, "--every") == 0)
         return whole(name, value, 1, 100000000, &o->every);
     if (strcmp(name, "--threads") == 0)
@@ -133,7 +139,7 @@ static bool read_option(options *o, const char *name, const char *value)
         return o->difference = true;
     if (strcmp(name, "--velocity") == 0)
         return bad_use("--velocity takes stored or difference", value);
-    return bad_use("unknown option", name);
+    return ascc_bad_option("sim", option_names, name, value);
 }
 
 static bool read_arguments(options *o, int argc, char **argv)
@@ -141,7 +147,7 @@ static bool read_arguments(options *o, int argc, char **argv)
     for (int i = 0; i < argc; i++) {
         if (argv[i][0] == '-') {
             if (i + 1 >= argc)
-                return bad_use("a value is missing behind", argv[i]);
+                return ascc_bad_option("sim", option_names, argv[i], NULL);
             if (!read_option(o, argv[i], argv[i + 1]))
                 return false;
             i++;
@@ -160,6 +166,24 @@ static bool read_arguments(options *o, int argc, char **argv)
 
 /* ---- The scene ---- */
 
+/* Adds the scene that was probably meant to an error. */
+static void suggest_scene(const char *scene, char *error, size_t capacity)
+{
+    enum { MOST = 16 };
+    char names[2 * MOST][64];
+    const char *known[2 * MOST + 1] = {NULL};
+    for (size_t i = 0; i < MOST && ascc_scene_names[i].name; i++)
+        for (size_t k = 2 * i; k < 2 * i + 2; k++) {
+            (void)snprintf(names[k], sizeof names[k], "%s-%dd", ascc_scene_names[i].name,
+                           k % 2 ? 3 : 2);
+            known[k] = names[k];
+        }
+    const char *meant = ascc_nearest(scene, known);
+    const size_t length = strlen(error);
+    if (meant)
+        (void)snprintf(error + length, capacity - length, "; did you mean '%s'?", meant);
+}
+
 /* What is no file and is named NAME-2d, NAME-3d or NAME (3D) is a built-in scene. */
 static bool load_scene(const options *o, double spacing, ascc_sequence *scene, char *error,
                        size_t capacity)
@@ -173,9 +197,13 @@ static bool load_scene(const options *o, double spacing, ascc_sequence *scene, c
     bool known = flat || deep;
     for (const ascc_scene_name *s = ascc_scene_names; s->name; s++)
         known = known || strcmp(s->name, name) == 0;
-    if (known && access(o->scene, F_OK) != 0)
-        return ascc_scene_make(name, flat ? 2 : 3, o->size, spacing, scene, error, capacity);
-    return ascc_sequence_read(o->scene, scene, error, capacity);
+    const bool file = access(o->scene, F_OK) == 0;
+    const bool good = known && !file ? ascc_scene_make(name, flat ? 2 : 3, o->size, spacing, scene,
+                                                       error, capacity)
+                                     : ascc_sequence_read(o->scene, scene, error, capacity);
+    if (!good && !file)
+        suggest_scene(o->scene, error, capacity);
+    return good;
 }
 
 /* Positions and velocities that start the run; from differences: frame 1, (frame 1 - frame 0) / dt. */
@@ -216,6 +244,7 @@ typedef struct simulation {
     ascc_particles *particles;
     ascc_step *step;
     ascc_sequence_writer *writer;
+    ascc_frames exported;
     float *position, *velocity;
     uint64_t *id;
     double time_step;
@@ -255,13 +284,12 @@ static bool write_frame(simulation *s)
                                 s->error, room))
             return false;
     }
-    if (s->o->ply) {
-        (void)snprintf(path, sizeof path, "%s/frame_%05d.ply", s->o->ply, s->steps);
-        if (!ascc_ply_write(path, s->scene.dimension, s->position, s->velocity, s->id,
-                            s->scene.count, s->error, room))
-            return false;
-    }
-    return true;
+    ascc_cloud cloud = {.dimension = s->scene.dimension,
+                        .count = s->scene.count,
+                        .position = s->position,
+                        .velocity = s->velocity,
+                        .id = s->id};
+    return ascc_frames_add(&s->exported, &cloud, s->error, room);
 }
 
 static bool measure(simulation *s, ascc_measures *m)
@@ -449,8 +477,12 @@ static bool open_outputs(simulation *s)
     }
     (void)ascc_particles_get_ids(s->particles, ASCC_FLUID, 0, s->scene.count, s->id);
     s->view = ascc_view_of(&s->scene);
+    s->exported = (ascc_frames){.ply = s->o->ply,
+                                .vtk = s->o->vtk,
+                                .every = (size_t)s->o->every,
+                                .time_step = s->time_step};
     if ((s->o->frames && !ascc_make_folder(s->o->frames, s->error, sizeof s->error)) ||
-        (s->o->ply && !ascc_make_folder(s->o->ply, s->error, sizeof s->error)))
+        !ascc_frames_open(&s->exported, &s->scene, s->error, sizeof s->error))
         return false;
     if (!s->o->out)
         return true;
@@ -503,6 +535,10 @@ int ascc_command_sim(int argc, char **argv)
     }
     if (s.error[0])
         ascc_line(stderr, "ascc sim: %s", s.error);
+    if (!ascc_frames_close(&s.exported, finish, sizeof finish)) {
+        ascc_line(stderr, "ascc sim: %s", finish);
+        good = false;
+    }
     if (interrupted)
         ascc_line(stderr, "ascc sim: interrupted after %d steps", s.steps);
     close_all(&s);

@@ -19,6 +19,7 @@
 #include <ascc/train.h>
 #include <jansson.h>
 
+#include "arguments.h"
 #include "commands.h"
 #include "console.h"
 #include "evaluate.h"
@@ -567,7 +568,7 @@ static void print_result(const training *t)
 
 /* ---- Arguments ------------------------------------------------------------------------------------ */
 
-static int usage(FILE *file)
+static int usage(void)
 {
     fputs("usage: ascc train CONFIG [--resume] [--iterations N] [--threads N]\n\n"
           "Trains a network as the file CONFIG says (docs/training.md). Ctrl-C saves and stops.\n\n"
@@ -575,8 +576,8 @@ static int usage(FILE *file)
           "stopped\n"
           "  --iterations N  stops (to be resumed) after N iterations in all\n"
           "  --threads N     threads to use (all); results do not depend on it\n",
-          file);
-    return file == stdout ? 0 : 2;
+          stdout);
+    return 0;
 }
 
 static bool read_count(const char *text, uint64_t most, uint64_t *value)
@@ -589,6 +590,7 @@ static bool read_count(const char *text, uint64_t most, uint64_t *value)
 
 static bool read_arguments(training *t, int argc, char **argv)
 {
+    static const char *const options[] = {"--resume", "--iterations", "--threads", NULL};
     uint64_t threads = 0;
     for (int i = 0; i < argc; i++) {
         const bool value = i + 1 < argc;
@@ -603,22 +605,21 @@ static bool read_arguments(training *t, int argc, char **argv)
         } else if (argv[i][0] != '-' && !t->path) {
             t->path = argv[i];
         } else {
-            ascc_line(stderr, "ascc train: %s: unknown, or not with this value", argv[i]);
-            return false;
+            return ascc_bad_option("train", options, argv[i], argv[i + 1]);
         }
     }
     const long processors = sysconf(_SC_NPROCESSORS_ONLN);
     t->threads = threads ? (int32_t)threads : processors > 0 ? (int32_t)processors : 1;
-    return t->path != NULL;
+    return t->path || ascc_bad_use("train", "a CONFIG is wanted", NULL, NULL);
 }
 
 int ascc_command_train(int argc, char **argv)
 {
     static training t; /* large: paths */
     if (argc == 1 && strcmp(argv[0], "--help") == 0)
-        return usage(stdout);
+        return usage();
     if (!read_arguments(&t, argc, argv))
-        return usage(stderr);
+        return 2;
     bool good = ascc_train_config_read(t.path, &t.config, t.error, sizeof t.error);
     if (good && (t.end == 0 || t.end > schedule_end(&t)))
         t.end = schedule_end(&t);

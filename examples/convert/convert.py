@@ -1,8 +1,10 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""Published data sets and networks as libascc's own files; see README.md beside this file.
+"""Published data sets and networks, and users' particles, as libascc's own files; see README.md beside this file.
 
     convert.py data FORMAT INPUT... -o DIR       one sequence file per scene
+    convert.py import INPUT... -o FILE           one's own particles: CSV, PLY, VTK, HDF5, NPZ
+    convert.py usd SEQUENCE -o FILE              a sequence as a USD stage
     convert.py weights FORMAT INPUT -o FILE      one network, for `ascc convert`
 
 Exit codes: 0 done, 2 wrong input or arguments; what was written before an error is whole.
@@ -41,6 +43,13 @@ def count(text):
     if value < 0:
         raise argparse.ArgumentTypeError(f"{text} is negative")
     return value
+
+
+def corners(text):
+    values = tuple(float(part) for part in text.replace(",", " ").split())
+    if len(values) not in (4, 6) or not all(map(math.isfinite, values)):
+        raise argparse.ArgumentTypeError(f"{text!r} is not four or six numbers")
+    return values
 
 
 def vector(text):
@@ -92,6 +101,34 @@ def arguments(argv):
     )
     data.add_argument("--source", help="text for the files' metadata")
 
+    own = commands.add_parser("import", help="one's own particles: CSV, PLY, VTK, HDF5, NPZ")
+    own.add_argument("input", nargs="+", help="a file a frame, or one with all; a .pvd; folders")
+    own.add_argument("-o", "--output", required=True, metavar="FILE", help="name.safetensors")
+    own.add_argument("--dt", type=positive, help="time between frames, s (times in the files)")
+    own.add_argument("--spacing", type=positive, help="particle spacing, m (measured)")
+    own.add_argument("--gravity", type=vector, metavar='"X Y [Z]"', help="m/s^2 (9.81 along -y)")
+    own.add_argument("--rest-density", type=positive, help="kg/m^3 (1000)")
+    own.add_argument(
+        "--scale", type=positive, default=1.0, help="metres in a unit of the files (1)"
+    )
+    own.add_argument("--dim", type=int, choices=(2, 3), help="2 drops z (where z never changes)")
+    own.add_argument("--position", metavar="NAME", help="array or columns X,Y,Z of positions")
+    own.add_argument("--velocity", dest="velocity_name", metavar="NAME", help="of velocities")
+    own.add_argument("--id", metavar="NAME", help="of ids: rows are put in their order")
+    own.add_argument("--fluid", metavar="NAME=V,...", help="only rows where NAME is one of V")
+    own.add_argument(
+        "--boundary", metavar="NAME=V,...", help="rows of the first frame that are walls"
+    )
+    own.add_argument("--walls", metavar="FILE", help="wall points, with normals or without")
+    own.add_argument("--box", type=corners, metavar='"LOW HIGH"', help="walls around a box")
+    own.add_argument("--wall-layers", type=count, default=1, help="of --box (1)")
+    own.add_argument("--source", help="text for the file's metadata")
+
+    usd = commands.add_parser("usd", help="a sequence as a USD stage of points")
+    usd.add_argument("input")
+    usd.add_argument("-o", "--output", required=True, metavar="FILE", help="name.usdc or .usda")
+    usd.add_argument("--every", type=count, default=1, help="each EVERY-th frame (1)")
+
     weights = commands.add_parser(
         "weights", help="networks", formatter_class=argparse.RawTextHelpFormatter
     )
@@ -106,13 +143,14 @@ def arguments(argv):
 
 
 def files(inputs, suffix):
-    """The named files, and those with the suffix in the named folders."""
+    """The named files, and those with the suffix (one or a tuple) in the named folders."""
     found = []
     for path in inputs:
         if os.path.isdir(path):
             names = sorted(name for name in os.listdir(path) if name.endswith(suffix))
             if not names:
-                raise ConvertError(path, "", f"no {suffix} files in this folder")
+                ends = suffix if isinstance(suffix, str) else " ".join(suffix)
+                raise ConvertError(path, "", f"no {ends} files in this folder")
             found += [os.path.join(path, name) for name in names]
         else:
             found.append(path)
@@ -137,11 +175,26 @@ def convert_data(options):
         written.add(item.name)
 
 
+def import_own(options):
+    reader = importlib.import_module("read_points")
+    found = files(options.input, tuple(reader.READERS))
+    folder = os.path.dirname(options.output)
+    if folder:
+        os.makedirs(folder, exist_ok=True)
+    importlib.import_module("sequence").write(reader.read(found, options), folder)
+
+
 def main(argv=None):
     options = arguments(argv)
     try:
         if options.command == "data":
             convert_data(options)
+        elif options.command == "import":
+            import_own(options)
+        elif options.command == "usd":
+            importlib.import_module("write_usd").write(
+                options.input, options.output, max(options.every, 1)
+            )
         else:
             importlib.import_module("weights").convert(
                 options.format, options.input, options.output

@@ -16,7 +16,7 @@ import unittest
 from unittest import mock
 
 HERE = os.path.dirname(os.path.abspath(__file__))
-sys.path.insert(0, HERE)
+sys.path[:0] = [HERE, os.path.join(HERE, "..", "..", "tests", "support")]
 
 import numpy as np  # noqa: E402
 
@@ -25,6 +25,7 @@ import crc32c  # noqa: E402
 import positions  # noqa: E402
 import read_bundle  # noqa: E402
 import sequence  # noqa: E402
+import tap  # noqa: E402
 import tensorfile  # noqa: E402
 import testfiles  # noqa: E402
 import weights  # noqa: E402
@@ -1050,41 +1051,5 @@ class Program(Case):
         self.assertIn("out", err)
 
 
-class Tap(unittest.TestResult):
-    """One line per test for tests/run.sh."""
-
-    count = 0
-
-    def line(self, word, test, note=""):
-        self.count += 1
-        print(f"{word} {self.count} - {test.id().removeprefix('__main__.')}{note}", flush=True)
-
-    def addSuccess(self, test):
-        self.line("ok", test)
-
-    def addSkip(self, test, reason):
-        super().addSkip(test, reason)
-        self.line("ok", test, f" # SKIP {reason}")
-
-    def stopTest(self, test):
-        super().stopTest(test)
-        bad = [
-            text
-            for case, text in self.failures + self.errors
-            if getattr(case, "test_case", case) is test
-        ]
-        if bad:
-            self.line("not ok", test)
-            print("".join("# " + row + "\n" for text in bad for row in text.splitlines()), end="")
-
-
-def main():
-    tests = unittest.defaultTestLoader.loadTestsFromModule(sys.modules[__name__])
-    print(f"1..{tests.countTestCases()}")
-    result = Tap()
-    tests.run(result)
-    return 0 if result.wasSuccessful() else 1
-
-
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(tap.main(sys.modules[__name__]))

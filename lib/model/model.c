@@ -7,6 +7,7 @@
 
 #include <math.h>
 #include <stdatomic.h>
+#include <errno.h>
 #include <stdio.h>
 #include <string.h>
 
@@ -201,7 +202,7 @@ ascc_status ascc_model_load(ascc_context *context, const char *path, ascc_model 
         return status;
     FILE *file = fopen(path, "rb");
     if (!file) {
-        ascc_fail(&message, ASCC_ERROR_FILE, "model: cannot open '%s'", path);
+        ascc_fail(&message, ASCC_ERROR_FILE, "model: cannot open '%s': %s", path, strerror(errno));
         return ascc_context_fail(context, ASCC_ERROR_FILE, &message);
     }
     status = read_file(&context->allocator, file, &bytes, &size);
