@@ -128,7 +128,7 @@ check 'only base/memory.c calls the allocator' "$(
 check 'lib never prints, aborts or exits' "$(
     code '(^|[^a-z_])(printf|fprintf|puts|putchar|perror|abort|exit|_Exit|signal|setlocale) *\(' none)"
 # Public functions that move no floating point number but by memcpy, if at all.
-plain='version|status_text|(train_)?context_.*|[a-z]+_(destroy|message)|model_(save|bytes)|trainer_(iteration|parameter_count)'
+plain='version|status_text|(train_)?context_.*|[a-z]+_(destroy|message)|model_(save|bytes|find)|trainer_(iteration|parameter_count)'
 plain="$plain|particles_(reserve|remove|clear|count|capacity|dimension|find|snapshot_size|momentum_quantum)"
 plain="$plain|particles_(total_momentum|get_(ids|bodies|momentum))"
 awk '/^[a-z].*[ *]ascc_[a-z_]+\(/ && !/;/ { sub(/\(.*/, ""); sub(/.*[ *]/, ""); name = $0 }
