@@ -109,6 +109,55 @@ else
     skip 'CMake' 'no cmake'
 fi
 
+# ---- One file ----
+
+# COMPILER WITH FLAGS: the one file gives the bits that tests/data/state-hashes.txt has, on every set of kernels.
+one_file() {
+    one=$folder/one
+    # shellcheck disable=SC2086
+    $1 -Wall -Wextra -Werror -c "$one/ascc.c" -o "$one/ascc.o" &&
+        mkdir -p "$one/include/ascc" && cp "$one/ascc.h" "$one/include/ascc/ascc.h" &&
+        $1 -I"$one/include" -Itests tests/state_hash.c tests/support/model_builder.c examples/demo_model.c \
+            "$one/ascc.o" -lm -pthread -o "$one/state_hash" &&
+        "$one/state_hash" >"$one/hashes" && [ -s "$one/hashes" ] || return 1
+    for cpu in $(awk '{ print $2 }' "$one/hashes" | sort -u); do
+        awk -v cpu="$cpu" '$2 == cpu { print $1, $3 }' "$one/hashes" | diff tests/data/state-hashes.txt - || return 1
+    done
+}
+if have python3; then
+    check 'the library becomes one file with its header' python3 lib/embed/amalgamate.py "$folder/one"
+    check 'which builds without a warning and gives the same bits' one_file 'cc -std=c11 -O1'
+    same_kernels() {
+        awk '{ print $2 }' "$folder/one/hashes" | sort -u >"$folder/sets"
+        "$folder/sets-of-library" | sort -u | diff - "$folder/sets"
+    }
+    cat >"$folder/sets.c" <<'END'
+#include <ascc/ascc.h>
+#include <stdio.h>
+int main(void)
+{
+    const uint32_t all = ASCC_CPU_AVX2 | ASCC_CPU_AVX512 | ASCC_CPU_NEON;
+    for (uint32_t use = 0; use <= all; use++) {
+        const ascc_context_options options = {.size = sizeof options, .cpu_disable = all & ~use};
+        ascc_context *context = NULL;
+        if (ascc_context_create(&options, &context) == ASCC_OK && ascc_context_cpu(context) == use)
+            printf("%u\n", (unsigned)use);
+        ascc_context_destroy(&context);
+    }
+    return 0;
+}
+END
+    check 'with the kernels that the library has' sh -c 'cc -static "$1/sets.c" -o "$1/sets-of-library" $2' sh "$folder" \
+        "$(pkg-config --cflags --static --libs ascc)"
+    check 'all of them' same_kernels
+    if [ -n "${ASCC_TEST_LONG:-}" ]; then
+        check 'the same bits with -O3 -march=native and the dialect of GNU' one_file 'cc -O3 -march=native'
+        have clang && check 'and from clang' one_file 'clang -O3 -march=native'
+    fi
+else
+    skip 'the library becomes one file' 'no python3'
+fi
+
 # ---- Meson subproject ----
 
 # A project with libascc in it, on a machine without pkg-config's packages: no libpng, jansson, cmocka.
