@@ -10,7 +10,7 @@
 #define ASCC_PATH_SIZE 4096
 
 #if defined(_WIN32)
-#define ASCC_PATH_SEPARATORS "/\\"
+#define ASCC_PATH_SEPARATORS "/\\:" /* the one behind a drive, too */
 #define ASCC_PATH_LIST_SEPARATOR ';'
 
 /* The path as Windows takes it; false with errno where it is no UTF-8 or too long. */
