@@ -167,7 +167,7 @@ machine() {
         }
         hashes "$build_name" "$machine_compiler" "${link_level:-$machine_level}" "$@"
         for u in $units; do
-            unit_test "$build_name" "$machine_compiler" "$machine_level" "$u" "$@"
+            unit_test "$build_name" "$machine_compiler" "${link_level:-$machine_level}" "$u" "$@"
         done
         if [ -n "$system" ]; then
             system_check "$build_name" "$machine_compiler" "$machine_level" "$@"
@@ -309,7 +309,7 @@ machine_flags="-s ALLOW_MEMORY_GROWTH=1 -s WASM_ASYNC_COMPILATION=0"
 suffix=.js
 link_level=1
 system=
-machine wasm emcc 3 "" node
+machine wasm emcc 3 kernels node
 machine_flags=
 suffix=
 

@@ -136,7 +136,7 @@ if have python3; then
 #include <stdio.h>
 int main(void)
 {
-    const uint32_t all = ASCC_CPU_AVX2 | ASCC_CPU_AVX512 | ASCC_CPU_NEON;
+    const uint32_t all = ASCC_CPU_AVX2 | ASCC_CPU_AVX512 | ASCC_CPU_NEON | ASCC_CPU_SIMD128;
     for (uint32_t use = 0; use <= all; use++) {
         const ascc_context_options options = {.size = sizeof options, .cpu_disable = all & ~use};
         ascc_context *context = NULL;

@@ -118,7 +118,7 @@ typedef struct setting {
 
 static const setting settings[] = {
     {1, false, 0},
-    {1, false, ASCC_CPU_AVX2 | ASCC_CPU_AVX512 | ASCC_CPU_NEON},
+    {1, false, ASCC_CPU_AVX2 | ASCC_CPU_AVX512 | ASCC_CPU_NEON | ASCC_CPU_SIMD128},
     {2, false, 0},
     {TASKS, true, 0},
 };

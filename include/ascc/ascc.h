@@ -103,9 +103,10 @@ typedef struct ascc_context_options {
     void *user; /* handed to the callbacks */
 } ascc_context_options;
 
-#define ASCC_CPU_AVX2 1u   /* x86-64: AVX2 with FMA */
-#define ASCC_CPU_AVX512 2u /* x86-64: AVX-512 F, BW, DQ, VL */
-#define ASCC_CPU_NEON 4u   /* aarch64 */
+#define ASCC_CPU_AVX2 1u    /* x86-64: AVX2 with FMA */
+#define ASCC_CPU_AVX512 2u  /* x86-64: AVX-512 F, BW, DQ, VL */
+#define ASCC_CPU_NEON 4u    /* aarch64 */
+#define ASCC_CPU_SIMD128 8u /* WebAssembly */
 
 /**
  * Makes a context. Contexts are independent of each other.

@@ -8,7 +8,7 @@
 #include "threads.h"
 
 #define MAX_THREADS 1024
-#define KNOWN_CPU_BITS (ASCC_CPU_AVX2 | ASCC_CPU_AVX512 | ASCC_CPU_NEON)
+#define KNOWN_CPU_BITS (ASCC_CPU_AVX2 | ASCC_CPU_AVX512 | ASCC_CPU_NEON | ASCC_CPU_SIMD128)
 
 /* The first released layout. */
 #define FIRST_OPTIONS_SIZE sizeof(ascc_context_options)
