@@ -304,6 +304,24 @@ units="kernels json safetensors sort neighbors search metrics particles"
 machine mingw x86_64-w64-mingw32-gcc-posix 3 "$units" $runner
 before=
 
+# The one file of lib/embed/amalgamate.py there.
+if [ -n "${ASCC_TEST_LONG:-}" ] && have x86_64-w64-mingw32-gcc-posix && have $runner && have python3; then
+    one=$build/one-file
+    # shellcheck disable=SC2086
+    if python3 lib/embed/amalgamate.py "$one" >"$one.log" 2>&1 && mkdir -p "$one/include/ascc" &&
+        mv "$one/ascc.h" "$one/include/ascc" && printf '#include "ascc/ascc.h"\n' >"$one/include/ascc.h" &&
+        x86_64-w64-mingw32-gcc-posix -std=c11 -O1 -Wall -Wextra -Werror -I"$one/include" -c "$one/ascc.c" \
+            -o "$one/ascc.o" >>"$one.log" 2>&1 &&
+        x86_64-w64-mingw32-gcc-posix -std=c11 -O1 -I"$one/include" -Itests $machine_flags $state_hash \
+            "$one/ascc.o" -o "$one/state_hash.exe" >>"$one.log" 2>&1 &&
+        $runner "$one/state_hash.exe" >"$one.hashes" 2>>"$one.log"; then
+        sed -i 's/\r$//' "$one.hashes"
+        compare "one file on Windows" "$one.hashes"
+    else
+        not_ok "one file on Windows" "$one.log"
+    fi
+fi
+
 # WebAssembly. Emscripten optimises scripts with a package of Node.js that may be missing: not above -O1.
 machine_flags="-s ALLOW_MEMORY_GROWTH=1 -s WASM_ASYNC_COMPILATION=0"
 suffix=.js
