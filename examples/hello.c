@@ -25,11 +25,13 @@ int main(int argc, char **argv)
     ascc_model *model;
     ascc_particles *particles;
     ascc_step *step;
-    char message[256] = "";
+    char message[256] = "", path[4096];
 
     const ascc_context_options options = {.size = sizeof options, .thread_count = 2};
     check(ascc_context_create(&options, &context), "context", message);
-    ascc_status status = ascc_model_load(context, argv[1], &model);
+    ascc_status status = ascc_model_find(context, argv[1], path, sizeof path);
+    if (status == ASCC_OK)
+        status = ascc_model_load(context, path, &model);
     ascc_context_message(context, message, sizeof message);
     check(status, argv[1], message);
 

@@ -57,7 +57,7 @@ check 'a folder of lib includes itself and lower ones' "$(awk '
 check 'no file of lib includes itself by way of others' "$(
     tsort <"$scratch/graph" 2>&1 >/dev/null | sed -n 's/^tsort: //p')"
 libc='assert|errno|fcntl|fenv|float|immintrin|inttypes|limits|malloc|math|pthread|stdalign|stdarg|stdatomic|stdbool'
-libc="$libc|stddef|stdint|stdio|stdlib|string|sys/stat|time|unistd|windows|arm_neon|sched"
+libc="$libc|stddef|stdint|stdio|stdlib|string|sys/stat|time|unistd|windows|arm_neon|sched|threads|wasm_simd128"
 check 'lib includes nothing but itself, the public headers and libc' "$(
     grep 'missing:' "$scratch/includes" | sed 's/missing:/"/; s/$/"/'
     grep '<' "$scratch/includes" | grep -vE " <($libc)\.h>$| <ascc/(ascc|version)\.h>$|^lib/train/.* <ascc/train\.h>$"
@@ -128,7 +128,7 @@ check 'only base/memory.c calls the allocator' "$(
 check 'lib never prints, aborts or exits' "$(
     code '(^|[^a-z_])(printf|fprintf|puts|putchar|perror|abort|exit|_Exit|signal|setlocale) *\(' none)"
 # Public functions that move no floating point number but by memcpy, if at all.
-plain='version|status_text|(train_)?context_.*|[a-z]+_(destroy|message)|model_(save|bytes)|trainer_(iteration|parameter_count)'
+plain='version|status_text|(train_)?context_.*|[a-z]+_(destroy|message)|model_(save|bytes|find)|trainer_(iteration|parameter_count)'
 plain="$plain|particles_(reserve|remove|clear|count|capacity|dimension|find|snapshot_size|momentum_quantum)"
 plain="$plain|particles_(total_momentum|get_(ids|bodies|momentum))"
 awk '/^[a-z].*[ *]ascc_[a-z_]+\(/ && !/;/ { sub(/\(.*/, ""); sub(/.*[ *]/, ""); name = $0 }

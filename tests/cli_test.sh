@@ -161,7 +161,7 @@ refuses 2 "a model, or --new with --spacing and --dt, and -o are wanted" relax
 refuses 2 "a model, or --new" relax --new 3 --spacing 0.05 -o r.safetensors
 refuses 2 "unknown option: --sweeps" relax --new 3 --sweeps 4
 refuses 2 "--omega 0.5,x: no value that it takes" relax --new 3 --omega 0.5,x
-refuses 1 "nowhere.safetensors: No such file" relax nowhere.safetensors -o r.safetensors
+refuses 1 "no folder of models has 'nowhere.safetensors'" relax nowhere.safetensors -o r.safetensors
 echo text >r.txt
 refuses 1 "r.txt: " relax r.txt -o r.safetensors
 refuses 1 "'omega' would not settle" relax --new 3 --spacing 0.05 --dt 0.02 --omega 0.6 -o r.safetensors

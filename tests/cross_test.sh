@@ -110,9 +110,11 @@ unit_test() {
     name=$1
     unit=$4
     sources=tests/test_$unit.c
-    [ "$unit" = float_env ] && sources="$sources tests/support/model_builder.c examples/demo_model.c"
+    grep -q support/model_builder.h $sources && sources="$sources tests/support/model_builder.c examples/demo_model.c"
+    grep -q support/counting.h tests/test_$unit.c && sources="$sources tests/support/counting.c"
+    grep -q support/oracle.h tests/test_$unit.c && sources="$sources tests/support/oracle.c tests/op_scale.c"
     # shellcheck disable=SC2086
-    link_program "$1" "$2" "$3" "test_$unit" -Itests/support/bare -DSOURCE_ROOT="\"$PWD\"" $sources
+    link_program "$1" "$2" "$3" "test_$unit" -Itests/support/bare $before -DSOURCE_ROOT="\"$PWD\"" $sources
     linked=$?
     shift 4
     if [ $linked -eq 0 ] && "$@" "$build/$name/test_$unit$suffix" >"$build/$name.$unit.log" 2>&1; then
@@ -121,6 +123,24 @@ unit_test() {
         not_ok "test_$unit: $name" "$build/$name.$unit.log"
     fi
 }
+
+# Files, models by name and threads of a built core: NAME, compiler, optimisation, then what runs a program.
+system_check() {
+    name=$1
+    program=$build/$1/system_check$suffix
+    link_program "$1" "$2" "$3" system_check tests/system_check.c examples/demo_model.c $with_threads
+    linked=$?
+    shift 3
+    if [ $linked -eq 0 ] && "$@" "$program" >"$build/$name.system.log" 2>&1; then
+        ok "files by names in UTF-8, models by name, threads: $name"
+    else
+        not_ok "files by names in UTF-8, models by name, threads: $name" "$build/$name.system.log"
+    fi
+}
+with_threads= # objects in place of the core's threads
+
+system=yes # has it files and threads?
+before=    # what tests of units include first
 
 # Another machine, built without a warning: NAME (of tests/cross/NAME.ini, if there is one), compiler,
 # levels of optimisation, units tested at the first, runner.
@@ -147,10 +167,14 @@ machine() {
         }
         hashes "$build_name" "$machine_compiler" "${link_level:-$machine_level}" "$@"
         for u in $units; do
-            unit_test "$build_name" "$machine_compiler" "$machine_level" "$u" "$@"
+            unit_test "$build_name" "$machine_compiler" "${link_level:-$machine_level}" "$u" "$@"
         done
-        units=
+        if [ -n "$system" ]; then
+            system_check "$build_name" "$machine_compiler" "$machine_level" "$@"
+        fi
+        units= system=
     done
+    system=yes
 }
 
 # A build that cannot give the bits ends with an error: LABEL, compiler, options.
@@ -182,6 +206,18 @@ if [ "$(uname -m)" = x86_64 ]; then
             fi
         done
     done
+
+    # Threads by pthreads, as the library has them here, and by C11, as it would where there are none.
+    name=x86_64-gcc-O3
+    if [ -f $build/$name/lib/libascc-core.a ]; then
+        system_check $name gcc 3 env
+        with_threads=$build/c11-threads.o
+        gcc -O2 -std=c11 -Wall -Wextra -Werror -DASCC_C11_THREADS -Ilib -c lib/base/threads.c -o $with_threads \
+            >"$build/c11-threads.log" 2>&1 || not_ok "threads by C11 build" "$build/c11-threads.log"
+        name=x86_64-gcc-O0
+        [ -f $build/$name/lib/libascc-core.a ] && system_check $name gcc 0 env
+        with_threads=
+    fi
 
     # Plain C with all the flags of this machine: contraction stays off, and fmaf is the instruction.
     name=x86_64-gcc-native
@@ -262,13 +298,36 @@ for path in /usr/lib/wine/wine64 /usr/lib/wine/wine; do
     have wine || [ ! -x $path ] || runner=$path
 done
 export WINEPREFIX="$PWD/$build/wine" WINEDEBUG=-all WINEDLLOVERRIDES="mscoree,mshtml="
-machine mingw x86_64-w64-mingw32-gcc-posix 3 "" $runner
+before="-include tests/support/bare/windows.h"
+units="kernels json safetensors sort neighbors search metrics particles"
+[ -z "${ASCC_TEST_LONG:-}" ] || units="$units float_env resample relaxation operations step"
+machine mingw x86_64-w64-mingw32-gcc-posix 3 "$units" $runner
+before=
+
+# The one file of lib/embed/amalgamate.py there.
+if [ -n "${ASCC_TEST_LONG:-}" ] && have x86_64-w64-mingw32-gcc-posix && have $runner && have python3; then
+    one=$build/one-file
+    # shellcheck disable=SC2086
+    if python3 lib/embed/amalgamate.py "$one" >"$one.log" 2>&1 && mkdir -p "$one/include/ascc" &&
+        mv "$one/ascc.h" "$one/include/ascc" && printf '#include "ascc/ascc.h"\n' >"$one/include/ascc.h" &&
+        x86_64-w64-mingw32-gcc-posix -std=c11 -O1 -Wall -Wextra -Werror -I"$one/include" -c "$one/ascc.c" \
+            -o "$one/ascc.o" >>"$one.log" 2>&1 &&
+        x86_64-w64-mingw32-gcc-posix -std=c11 -O1 -I"$one/include" -Itests $machine_flags $state_hash \
+            "$one/ascc.o" -o "$one/state_hash.exe" >>"$one.log" 2>&1 &&
+        $runner "$one/state_hash.exe" >"$one.hashes" 2>>"$one.log"; then
+        sed -i 's/\r$//' "$one.hashes"
+        compare "one file on Windows" "$one.hashes"
+    else
+        not_ok "one file on Windows" "$one.log"
+    fi
+fi
 
 # WebAssembly. Emscripten optimises scripts with a package of Node.js that may be missing: not above -O1.
 machine_flags="-s ALLOW_MEMORY_GROWTH=1 -s WASM_ASYNC_COMPILATION=0"
 suffix=.js
 link_level=1
-machine wasm emcc 3 "" node
+system=
+machine wasm emcc 3 kernels node
 machine_flags=
 suffix=
 

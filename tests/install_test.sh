@@ -103,5 +103,62 @@ exports() { nm -D --defined-only "$library" | awk '{ print $3 }' | LC_ALL=C sort
 check 'it exports what tests/exports.txt lists' exports
 only_ours() { ! nm -D --defined-only "$library" | awk '{ print $3 }' | grep -v '^ascc_'; }
 check 'it exports nothing but ascc_*' only_ours
+
+# ---- What lies beside the libraries ----
+
+share=$folder/root/share
+installed=$folder/root/bin/ascc
+check 'the licence is there' cmp COPYING "$share/licenses/ascc/COPYING"
+models() { diff -r examples/models "$share/ascc/models"; }
+check 'every model is there' models
+by_name() { (cd / && "$installed" info water3d | grep -q 'water3d: model water3d'); }
+check 'the program finds a model by name, from any folder' by_name
+mkdir "$folder/models" && cp examples/models/pbf2d.safetensors "$folder/models/mine.safetensors"
+by_path() { (cd / && ASCC_MODEL_PATH="/nowhere:$folder/models" "$installed" sim mine dam-break-2d --size 6 -n 2); }
+check 'and one of ASCC_MODEL_PATH' by_path
+beside() { (cd / && "$folder/find" mine | grep -qx "$folder/models/mine.safetensors"); }
+cat >"$folder/find.c" <<'END'
+#include <ascc/ascc.h>
+#include <stdio.h>
+int main(int argc, char **argv)
+{
+    char path[4096];
+    ascc_context *context;
+    if (argc != 2 || ascc_context_create(NULL, &context) != ASCC_OK ||
+        ascc_model_find(context, argv[1], path, sizeof path) != ASCC_OK)
+        return 1;
+    return puts(path) < 0;
+}
+END
+# shellcheck disable=SC2086
+check 'a host asks by one call' cc $warnings "$folder/find.c" -o "$folder/find" $flags
+check 'it finds what lies beside it' beside
+unknown() { (cd / && "$installed" info water9d 2>&1 | grep -q "no folder of models has 'water9d.safetensors'"); }
+check 'what is nowhere is told by name' unknown
+# Each command that `ascc --help` lists has a page; troff has nothing to say against any.
+pages() {
+    commands=$("$installed" --help | sed -n 's/^  \([a-z]*\)  .*/\1/p' | grep -vx version)
+    [ -n "$commands" ] || return 1
+    for page in ascc $(echo "$commands" | sed 's/^/ascc-/'); do
+        grep -q '^\.SH SYNOPSIS' "$share/man/man1/$page.1" || return 1
+        ! command -v groff >/dev/null || [ -z "$(groff -man -ww -Tutf8 -z "$share/man/man1/$page.1" 2>&1 | tee /dev/stderr)" ] || return 1
+    done
+}
+check 'the program and every command have a page of the manual' pages
+options() { grep -c '^\.TP' "$share/man/man1/ascc-sim.1" | awk '{ exit $1 < 10 }' && grep -q '^time steps$' "$share/man/man1/ascc-sim.1"; }
+check 'a page has the options one by one' options
+# WORDS..., the last to be completed: what bash would offer.
+offers() {
+    wanted=$1
+    shift
+    PATH=$folder/root/bin:$PATH bash -c '. "$1" && shift && COMP_WORDS=("$@") COMP_CWORD=$(($# - 1)) && _ascc &&
+        printf "%s\n" "${COMPREPLY[@]}"' bash "$share/bash-completion/completions/ascc" ascc "$@" | grep -qxe "$wanted"
+}
+if command -v bash >/dev/null; then
+    check 'bash completes commands' offers generate gen
+    check 'models' offers water2d-tiny sim water2
+    check 'scenes' offers dam-break-3d sim water3d dam
+    check 'and options' offers --threads sim --th
+fi
 echo "1..$number"
 exit $failed

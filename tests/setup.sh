@@ -41,7 +41,7 @@ setup_optional() {
         >/dev/null 2>&1 && echo "Installed: $*"
 }
 
-# What tests/cross_test.sh needs for some machines, and is small; for root only. Where they are it also
+# What tests/cross_test.sh needs for some machines, and tests/embed_test.sh, and is small; for root only. Where they are it also
 # uses gcc-mingw-w64-x86-64-posix with wine, and emscripten with nodejs.
 setup_cross() {
     [ "$(id -u)" -eq 0 ] && command -v apt-get >/dev/null 2>&1 || return 0
@@ -49,5 +49,6 @@ setup_cross() {
     setup_optional aarch64-linux-gnu-gcc gcc-aarch64-linux-gnu libc6-dev-arm64-cross
     setup_optional s390x-linux-gnu-gcc gcc-s390x-linux-gnu libc6-dev-s390x-cross
     setup_optional i686-linux-gnu-gcc gcc-i686-linux-gnu libc6-dev-i386-cross
+    setup_optional cmake cmake # tests/embed_test.sh
     return 0
 }

@@ -127,7 +127,7 @@ static uint64_t hash_after(ascc_context *context, const scene *s)
 
 int main(void)
 {
-    const uint32_t all = ASCC_CPU_AVX2 | ASCC_CPU_AVX512 | ASCC_CPU_NEON;
+    const uint32_t all = ASCC_CPU_AVX2 | ASCC_CPU_AVX512 | ASCC_CPU_NEON | ASCC_CPU_SIMD128;
     for (uint32_t use = 0; use <= all; use++) {
         const ascc_context_options options = {
             .size = sizeof options, .thread_count = 1, .cpu_disable = all & ~use};

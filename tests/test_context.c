@@ -206,8 +206,13 @@ static void a_context_needs_no_options(void **state)
 static void bits_of_the_cpu_can_be_disabled(void **state)
 {
     (void)state;
-    static const uint32_t bits[] = {0, ASCC_CPU_AVX2, ASCC_CPU_AVX512, ASCC_CPU_NEON,
-                                    ASCC_CPU_AVX2 | ASCC_CPU_AVX512 | ASCC_CPU_NEON};
+    static const uint32_t bits[] = {0,
+                                    ASCC_CPU_AVX2,
+                                    ASCC_CPU_AVX512,
+                                    ASCC_CPU_NEON,
+                                    ASCC_CPU_SIMD128,
+                                    ASCC_CPU_AVX2 | ASCC_CPU_AVX512 | ASCC_CPU_NEON |
+                                        ASCC_CPU_SIMD128};
     for (size_t i = 0; i < COUNT_OF(bits); i++) {
         const ascc_context_options options = {.size = sizeof options, .cpu_disable = bits[i]};
         ascc_context *context;
@@ -239,8 +244,8 @@ static void options_out_of_range_are_refused_and_named(void **state)
     options.thread_count = 1025;
     refuses(&options, &book, "thread_count is 1025");
     options.thread_count = 2;
-    options.cpu_disable = 8;
-    refuses(&options, &book, "cpu_disable is 0x8");
+    options.cpu_disable = 16;
+    refuses(&options, &book, "cpu_disable is 0x10");
     options.cpu_disable = 0;
     options.enqueue = some_enqueue;
     refuses(&options, &book, "enqueue and finish");

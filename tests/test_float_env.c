@@ -118,7 +118,7 @@ typedef struct setting {
 
 static const setting settings[] = {
     {1, false, 0},
-    {1, false, ASCC_CPU_AVX2 | ASCC_CPU_AVX512 | ASCC_CPU_NEON},
+    {1, false, ASCC_CPU_AVX2 | ASCC_CPU_AVX512 | ASCC_CPU_NEON | ASCC_CPU_SIMD128},
     {2, false, 0},
     {TASKS, true, 0},
 };
@@ -248,7 +248,7 @@ static void leave(const char *call)
 
 static void walk_models(ascc_context *context, const scene *s, ascc_model **model)
 {
-    char path[] = "/tmp/ascc-float-env-XXXXXX";
+    char path[] = "/tmp/ascc-float-env-XXXXXX", found[4096];
     const int file = mkstemp(path);
     assert_true(file >= 0);
     ascc_model_info info = {.size = sizeof info};
@@ -259,6 +259,8 @@ static void walk_models(ascc_context *context, const scene *s, ascc_model **mode
     BAD(ascc_model_load_memory(context, s->model, s->model_size / 2, &(ascc_model *){NULL}));
     GOOD(ascc_model_save(*model, path));
     DO(ascc_model_destroy(model));
+    GOOD(ascc_model_find(context, path, found, sizeof found));
+    BAD(ascc_model_find(context, "no model of this name", found, sizeof found));
     GOOD(ascc_model_load(context, path, model));
     remove(path);
     BAD(ascc_model_load(context, path, &(ascc_model *){NULL}));

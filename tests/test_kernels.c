@@ -772,6 +772,51 @@ static void blocks_are_multiplied_as_columns_on_every_cpu(void **state)
             }
 }
 
+/* Any sign, an exponent among [low, high], and a mantissa that ends in `zeros` zeros. */
+static float number(uint32_t low, uint32_t high, int zeros)
+{
+    const uint32_t mantissa = (next() & 0x7fffffu) >> zeros << zeros;
+    const uint32_t bits = (next() & 1u) << 31 | (low + next() % (high - low + 1)) << 23 | mantissa;
+    float value;
+    memcpy(&value, &bits, sizeof value);
+    return value;
+}
+
+/* Sums that lie on midpoints of floats or right beside, that are subnormal, zero or exact. */
+static void products_and_sums_are_rounded_once_on_every_cpu(void **state)
+{
+    (void)state;
+    enum { A = 3, B = 8 };
+    ascc_kernels table[16];
+    const int count = tables(table);
+    for (int i = 0; i < 300000; i++) {
+        float in[A] = {0}, weight[A * B], want[B], begin[B];
+        const int kind = i % 4, zeros = i % 24, k = 16 + i % 8;
+        for (int j = 0; j < A * B; j++)
+            weight[j] = kind == 0   ? number(120, 134, 12)
+                        : kind == 1 ? number(20, 60, zeros)
+                        : kind == 2 ? ldexpf(next() % 2 ? 1.0f - ldexpf(1.0f, -k) : -1.0f, -80)
+                                    : (float)(next() % 3);
+        for (int j = 0; j < (kind == 2 ? 1 : A); j++)
+            in[j] = kind == 0   ? number(120, 134, 11)
+                    : kind == 1 ? number(40, 80, 0)
+                    : kind == 2 ? ldexpf(1.0f + ldexpf(1.0f, -k), -70) /* 2^-150 (1 - 2^-2k) */
+                                : (float)(next() % 2);
+        for (int j = 0; j < B; j++)
+            want[j] = begin[j] = kind == 0   ? number(0, 160, zeros)
+                                 : kind == 1 ? number(0, 3, 0)
+                                 : kind == 2 ? number(0, 1, 0)
+                                             : number(100, 127, zeros) * (float)(next() % 2);
+        table[0].multiply(in, A, 1, A, weight, B, want, B);
+        for (int t = 1; t < count; t++) {
+            float out[B];
+            memcpy(out, begin, sizeof out);
+            table[t].multiply(in, A, 1, A, weight, B, out, B);
+            check_same_bits(want, out, B, "product");
+        }
+    }
+}
+
 static void multiply_equals_doubles_and_has_the_same_bits_on_every_cpu(void **state)
 {
     (void)state;
@@ -1235,6 +1280,7 @@ int main(void)
         cmocka_unit_test(pair_lines_equal_doubles_and_have_the_same_bits_on_every_cpu),
         cmocka_unit_test(gather_equals_doubles_and_has_the_same_bits_on_every_cpu),
         cmocka_unit_test(blocks_are_multiplied_as_columns_on_every_cpu),
+        cmocka_unit_test(products_and_sums_are_rounded_once_on_every_cpu),
         cmocka_unit_test(multiply_equals_doubles_and_has_the_same_bits_on_every_cpu),
         cmocka_unit_test(pair_terms_equal_doubles_and_have_the_same_bits_on_every_cpu),
         cmocka_unit_test(pair_impulses_are_the_nearest_integers_on_every_cpu),

@@ -347,6 +347,60 @@ static void saved_again_is_byte_identical(void **state)
     free(copy);
 }
 
+/* Two folders of the test's own hold a file "findable.safetensors" each, or not. */
+static void names_are_looked_for_in_order(void **state)
+{
+    (void)state;
+    char folder[2][64] = {"test_find_a_XXXXXX", "test_find_b_XXXXXX"}, file[2][160], list[256];
+    char path[4096] = "untouched", short_path[8] = "", wanted[128];
+    for (int i = 0; i < 2; i++) {
+        assert_non_null(mkdtemp(folder[i]));
+        (void)snprintf(file[i], sizeof file[i], "%s/findable.safetensors", folder[i]);
+        FILE *made = fopen(file[i], "wb");
+        assert_non_null(made);
+        fclose(made);
+    }
+    assert_int_equal(setenv("ASCC_MODEL_PATH", "", 1), 0);
+    assert_int_equal(ascc_model_find(context, "findable", path, sizeof path), ASCC_ERROR_FILE);
+    assert_string_equal(path, "untouched");
+    ascc_context_message(context, text, sizeof text);
+    assert_non_null(strstr(text, "'findable.safetensors'"));
+
+    (void)snprintf(list, sizeof list, "/nowhere::%s:%s", folder[1], folder[0]);
+    assert_int_equal(setenv("ASCC_MODEL_PATH", list, 1), 0);
+    assert_int_equal(ascc_model_find(context, "findable", path, sizeof path), ASCC_OK);
+    assert_string_equal(path, file[1]);
+    remove(file[1]);
+    assert_int_equal(ascc_model_find(context, "findable", path, sizeof path), ASCC_OK);
+    assert_string_equal(path, file[0]);
+    assert_int_equal(ascc_model_find(context, "findable.safetensors", path, sizeof path), ASCC_OK);
+    assert_string_equal(path, file[0]);
+    assert_int_equal(ascc_model_find(context, "findable", short_path, sizeof short_path),
+                     ASCC_ERROR_ARGUMENT);
+    assert_string_equal(short_path, "");
+    (void)snprintf(wanted, sizeof wanted, "%.60s/findable", folder[0]);
+    assert_int_equal(ascc_model_find(context, wanted, path, sizeof path), ASCC_OK);
+    assert_string_equal(path, wanted); /* a path, whether there is a file or not */
+
+    /* A file in the working directory has the last word; a folder of that name has none. */
+    assert_int_equal(rename(file[0], "findable"), 0);
+    assert_int_equal(ascc_model_find(context, "findable", path, sizeof path), ASCC_OK);
+    assert_string_equal(path, "findable");
+    remove("findable");
+    assert_int_equal(ascc_model_find(context, folder[0], path, sizeof path), ASCC_ERROR_FILE);
+
+    char long_name[5000];
+    memset(long_name, 'x', sizeof long_name - 1);
+    long_name[sizeof long_name - 1] = '\0';
+    assert_int_equal(ascc_model_find(context, long_name, path, sizeof path), ASCC_ERROR_FILE);
+    assert_int_equal(ascc_model_find(context, NULL, path, sizeof path), ASCC_ERROR_ARGUMENT);
+    assert_int_equal(ascc_model_find(context, "x", NULL, 0), ASCC_ERROR_ARGUMENT);
+    assert_int_equal(ascc_model_find(NULL, "x", path, sizeof path), ASCC_ERROR_ARGUMENT);
+    assert_int_equal(unsetenv("ASCC_MODEL_PATH"), 0);
+    for (int i = 0; i < 2; i++)
+        remove(folder[i]);
+}
+
 static void arguments_and_paths_are_checked(void **state)
 {
     (void)state;
@@ -1155,6 +1209,7 @@ int main(void)
         cmocka_unit_test(plan_says_what_the_file_says),
         cmocka_unit_test(documented_examples_load),
         cmocka_unit_test(saved_again_is_byte_identical),
+        cmocka_unit_test(names_are_looked_for_in_order),
         cmocka_unit_test(arguments_and_paths_are_checked),
         cmocka_unit_test(model_outlives_its_context),
         cmocka_unit_test(base_network_loads),

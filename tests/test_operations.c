@@ -12,7 +12,7 @@
 
 #define SPACING 0.05
 #define MAX_POINTS 64
-#define CPUS (ASCC_CPU_AVX2 | ASCC_CPU_AVX512 | ASCC_CPU_NEON)
+#define CPUS (ASCC_CPU_AVX2 | ASCC_CPU_AVX512 | ASCC_CPU_NEON | ASCC_CPU_SIMD128)
 
 /* Of the largest correction, or of a tensor's largest gradient. Floats are 6e-8 apart; sums of some hundred
  * products through up to four layers lose a digit or two. Hats that are divided by their sum lose more where it

@@ -166,7 +166,7 @@ equals() {
 
 config old.json old 's/"unroll"/"horizon"/;s/"warm_up"/"presteps"/'
 run train old.json --threads 1 --iterations 13
-sed '1s/unroll,warm_up/horizon,presteps/' old/m.csv >changed && mv changed old/m.csv
+sed '1s/unroll,warm_up/horizon,presteps/;1s/cpu_seconds/seconds/' old/m.csv >changed && mv changed old/m.csv
 run train old.json --threads 1 --resume
 holds 'an old log is gone on with' grep -q '^iteration,stage,horizon,presteps,' old/m.csv
 sed '1s/horizon,presteps/unroll,warm_up/' old/m.csv >changed && mv changed old/m.csv

@@ -29,12 +29,21 @@ static ascc_status load_bytes(ascc_context *context, unsigned char *bytes, size_
     return told(context, status, error);
 }
 
-ascc_status ascc_host_load(ascc_context *context, const char *path, ascc_model **model,
+ascc_status ascc_host_find(ascc_context *context, const char *name, char path[ASCC_HOST_PATH],
+                           ascc_host_error *error)
+{
+    return told(context, ascc_model_find(context, name, path, ASCC_HOST_PATH), error);
+}
+
+ascc_status ascc_host_load(ascc_context *context, const char *name, ascc_model **model,
                            ascc_host_error *error)
 {
     size_t size;
     ascc_host_error why;
-    const ascc_status status = told(context, ascc_model_load(context, path, model), error);
+    char path[ASCC_HOST_PATH];
+    ascc_status status = ascc_host_find(context, name, path, error);
+    if (status == ASCC_OK)
+        status = told(context, ascc_model_load(context, path, model), error);
     if (status != ASCC_ERROR_FORMAT)
         return status;
     unsigned char *bytes = ascc_tensor_file_read(path, &size, why.text, sizeof why.text);

@@ -12,8 +12,14 @@ typedef struct ascc_host_error {
     char text[256];
 } ascc_host_error;
 
-/* A model file or a published network (published.h). */
-ascc_status ascc_host_load(ascc_context *context, const char *path, ascc_model **model,
+enum { ASCC_HOST_PATH = 4096 };
+
+/* The file of a model by name (ascc_model_find), or by path. */
+ascc_status ascc_host_find(ascc_context *context, const char *name, char path[ASCC_HOST_PATH],
+                           ascc_host_error *error);
+
+/* A model file, by name or path, or a published network (published.h). */
+ascc_status ascc_host_load(ascc_context *context, const char *name, ascc_model **model,
                            ascc_host_error *error);
 
 /* The same, or `demo`: the demonstration model for that dimension and spacing. */

@@ -195,7 +195,7 @@ static void learned_body_impulse(const void *state, double impulse[3])
 
 const ascc_method ascc_method_model = {
     .prefix = "",
-    .help = "FILE           a model file or published network, run by libascc; demo: the "
+    .help = "MODEL          a model by name (water3d) or file, or a published network; demo: the "
             "demonstration model",
     .open = learned_open,
     .set = learned_set,

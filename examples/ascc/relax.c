@@ -16,6 +16,7 @@
 #include "arguments.h"
 #include "commands.h"
 #include "console.h"
+#include "host.h"
 #include "tensor_file.h"
 
 #define SWEEPS 32
@@ -219,17 +220,30 @@ static json_t *new_header(void)
     return json_pack("{s:{s:s,s:s}}", "__metadata__", "format", "ascc.model", "version", "1");
 }
 
+/* The bytes of the model file of that name or path, from malloc; NULL with *why. */
+static unsigned char *read_model(const char *name, size_t *size, ascc_host_error *why)
+{
+    char path[ASCC_HOST_PATH];
+    ascc_context *context = NULL;
+    ascc_status status = ascc_context_create(NULL, &context);
+    if (status == ASCC_OK)
+        status = ascc_host_find(context, name, path, why);
+    ascc_context_destroy(&context);
+    return status == ASCC_OK ? ascc_tensor_file_read(path, size, why->text, sizeof why->text)
+                             : NULL;
+}
+
 /* The bytes of the model that was asked for, from malloc; NULL after failed. */
 static unsigned char *change(const relax *r, size_t *size)
 {
-    char why[256] = "no model file";
+    ascc_host_error why = {"no model file"};
     size_t old_size = 0, data = 0;
     unsigned char *made = NULL, *old = NULL;
     json_t *header = NULL;
     if (r->model)
-        old = ascc_tensor_file_read(r->model, &old_size, why, sizeof why);
+        old = read_model(r->model, &old_size, &why);
     if (old)
-        header = ascc_tensor_file_header(old, old_size, &data, why, sizeof why);
+        header = ascc_tensor_file_header(old, old_size, &data, why.text, sizeof why.text);
     else if (!r->model)
         header = new_header();
     const char *before = header ? ascc_tensor_file_metadata(header, "network") : NULL;
@@ -238,10 +252,10 @@ static unsigned char *change(const relax *r, size_t *size)
         json_object_set_new(json_object_get(header, "__metadata__"), "network", json_string(text));
         made = ascc_tensor_file_build(header, old ? old + data : NULL, old_size - data, size);
     } else if (header) {
-        (void)snprintf(why, sizeof why, "no model file");
+        (void)snprintf(why.text, sizeof why.text, "no model file");
     }
     if (!made)
-        (void)failed(r->model ? r->model : "--new", why);
+        (void)failed(r->model ? r->model : "--new", why.text);
     free(text);
     json_decref(header);
     free(old);

@@ -32,7 +32,8 @@ static void usage(FILE *to)
     fprintf(
         to,
         "usage: ascc sim MODEL SCENE -n STEPS [-o OUT] [options]\n\n"
-        "MODEL  a model file, a published network, or demo (a demonstration model, not trained)\n"
+        "MODEL  a model by name (water3d) or file, a published network, or demo (a demonstration\n"
+        "       model, not trained)\n"
         "SCENE  a sequence file, whose first frame starts the run, or one of (3D without -2d)\n");
     for (const ascc_scene_name *s = ascc_scene_names; s->name; s++)
         fprintf(to, "         %s-2d, %s-3d: %s\n", s->name, s->name, s->text);

@@ -103,9 +103,10 @@ typedef struct ascc_context_options {
     void *user; /* handed to the callbacks */
 } ascc_context_options;
 
-#define ASCC_CPU_AVX2 1u   /* x86-64: AVX2 with FMA */
-#define ASCC_CPU_AVX512 2u /* x86-64: AVX-512 F, BW, DQ, VL */
-#define ASCC_CPU_NEON 4u   /* aarch64 */
+#define ASCC_CPU_AVX2 1u    /* x86-64: AVX2 with FMA */
+#define ASCC_CPU_AVX512 2u  /* x86-64: AVX-512 F, BW, DQ, VL */
+#define ASCC_CPU_NEON 4u    /* aarch64 */
+#define ASCC_CPU_SIMD128 8u /* WebAssembly */
 
 /**
  * Makes a context. Contexts are independent of each other.
@@ -135,7 +136,7 @@ ASCC_API size_t ascc_context_message(const ascc_context *context, char *text, si
 typedef struct ascc_model ascc_model;
 
 /**
- * Loads a model from a safetensors file (docs/file-format.md). Published networks (metadata format
+ * Loads a model from a safetensors file (docs/file-format.md), by its path in UTF-8. Published networks (metadata format
  * "ascc.weights") are refused: `ascc convert` makes model files of them.
  *
  * context   may be destroyed before the model.
@@ -145,6 +146,23 @@ typedef struct ascc_model ascc_model;
  * threads   a model never changes: any number of steps on any threads may share it.
  */
 ASCC_API ascc_status ascc_model_load(ascc_context *context, const char *path, ascc_model **model);
+
+/**
+ * Finds a model file by name: "water3d" is water3d.safetensors in the first of these folders that has it.
+ *
+ *   - those of the environment's ASCC_MODEL_PATH, with ':' between them (';' on Windows)
+ *   - the one the running program lies in, `models` in it, and ../share/ascc/models from there (Linux,
+ *     Windows)
+ *   - the one that models were installed in with the library
+ *
+ * A name with a '/', and one of a file in the working directory, is a path and comes back as it is.
+ *
+ * path      path[capacity], UTF-8, for ascc_model_load; 4096 is always enough. Untouched on error.
+ * errors    ARGUMENT (NULL; a path that does not fit), FILE (no folder has it).
+ * threads   any; none may change the environment meanwhile.
+ */
+ASCC_API ascc_status ascc_model_find(ascc_context *context, const char *name, char *path,
+                                     size_t capacity);
 
 /** As ascc_model_load, from memory: data[size], copied. */
 ASCC_API ascc_status ascc_model_load_memory(ascc_context *context, const void *data, size_t size,

@@ -2,12 +2,13 @@
  * in any order. SPDX-License-Identifier: MIT */
 #include "context.h"
 
-#include <pthread.h>
 #include <stdatomic.h>
 #include <string.h>
 
+#include "threads.h"
+
 #define MAX_THREADS 1024
-#define KNOWN_CPU_BITS (ASCC_CPU_AVX2 | ASCC_CPU_AVX512 | ASCC_CPU_NEON)
+#define KNOWN_CPU_BITS (ASCC_CPU_AVX2 | ASCC_CPU_AVX512 | ASCC_CPU_NEON | ASCC_CPU_SIMD128)
 
 /* The first released layout. */
 #define FIRST_OPTIONS_SIZE sizeof(ascc_context_options)
@@ -15,7 +16,7 @@ _Static_assert(sizeof(void *) != 8 || FIRST_OPTIONS_SIZE == 72, "layout is part 
 
 struct ascc_context_shared {
     atomic_size_t references;
-    pthread_mutex_t lock; /* of message */
+    ascc_lock lock; /* of message */
     ascc_message message;
 };
 
@@ -62,7 +63,7 @@ static ascc_status make(const ascc_context_options *options, ascc_context **cont
     if (block == NULL)
         return ascc_fail(message, ASCC_ERROR_MEMORY, "context: out of memory");
     memset(block, 0, sizeof *block);
-    if (pthread_mutex_init(&block->shared.lock, NULL) != 0) {
+    if (!ascc_lock_open(&block->shared.lock)) {
         ascc_release(&allocator, block, 1, sizeof *block);
         return ascc_fail(message, ASCC_ERROR_MEMORY, "context: no lock");
     }
@@ -80,7 +81,7 @@ static ascc_status make(const ascc_context_options *options, ascc_context **cont
     const ascc_status status = ascc_workers_create(&allocator, threads, options->enqueue,
                                                    options->finish, options->user, &made->workers);
     if (status != ASCC_OK) {
-        pthread_mutex_destroy(&block->shared.lock);
+        ascc_lock_close(&block->shared.lock);
         ascc_release(&allocator, block, 1, sizeof *block);
         return ascc_fail(message, status, "context: %ld threads could not be started",
                          (long)threads);
@@ -126,7 +127,7 @@ void ascc_context_release(ascc_context *context)
     if (atomic_fetch_sub_explicit(&context->shared->references, 1, memory_order_acq_rel) != 1)
         return;
     ascc_workers_destroy(&context->workers);
-    pthread_mutex_destroy(&context->shared->lock);
+    ascc_lock_close(&context->shared->lock);
     context->magic = 0;
     const ascc_allocator allocator = context->allocator;
     ascc_release(&allocator, context, 1, sizeof(context_block));
@@ -140,9 +141,9 @@ uint32_t ascc_context_cpu(const ascc_context *context)
 ascc_status ascc_context_fail(ascc_context *context, ascc_status status,
                               const ascc_message *message)
 {
-    pthread_mutex_lock(&context->shared->lock);
+    ascc_lock_take(&context->shared->lock);
     context->shared->message = *message;
-    pthread_mutex_unlock(&context->shared->lock);
+    ascc_lock_give(&context->shared->lock);
     ascc_context_log(context, message->text);
     return status;
 }
@@ -157,9 +158,9 @@ size_t ascc_context_message(const ascc_context *context, char *text, size_t capa
 {
     ascc_message message = {""};
     if (is_context(context)) {
-        pthread_mutex_lock(&context->shared->lock);
+        ascc_lock_take(&context->shared->lock);
         message = context->shared->message;
-        pthread_mutex_unlock(&context->shared->lock);
+        ascc_lock_give(&context->shared->lock);
     }
     const size_t length = strlen(message.text);
     if (text != NULL && capacity > 0) {

@@ -12,15 +12,15 @@
  */
 #include "workers.h"
 
-#include <pthread.h>
-#include <sched.h>
 #include <stdatomic.h>
 
-/* Turns of sched_yield before an idle thread goes to sleep: some microseconds. */
+#include "threads.h"
+
+/* Turns of yielding before an idle thread goes to sleep: some microseconds. */
 #define IDLE_TURNS 32
 
 typedef struct worker {
-    pthread_t thread;
+    ascc_thread thread;
     ascc_workers *workers;
     int32_t slot;
 } worker;
@@ -38,8 +38,8 @@ struct ascc_workers {
     _Atomic uint32_t blocks;
 
     /* Sleep and waking. */
-    pthread_mutex_t lock;
-    pthread_cond_t wake, finished;
+    ascc_lock lock;
+    ascc_condition wake, finished;
     _Atomic int32_t sleepers;
     bool stop; /* under lock */
 
@@ -63,9 +63,9 @@ static uint32_t blocks_left(uint64_t ticket)
 static void finish_block(ascc_workers *workers, uint32_t blocks)
 {
     if (atomic_fetch_add(&workers->done, 1) + 1 == blocks && atomic_load(&workers->caller_sleeps)) {
-        pthread_mutex_lock(&workers->lock);
-        pthread_cond_signal(&workers->finished);
-        pthread_mutex_unlock(&workers->lock);
+        ascc_lock_take(&workers->lock);
+        ascc_condition_wake_one(&workers->finished);
+        ascc_lock_give(&workers->lock);
     }
 }
 
@@ -99,24 +99,23 @@ static bool wait_for_blocks(ascc_workers *workers)
     for (int turn = 0; turn < IDLE_TURNS; turn++) {
         if (blocks_left(atomic_load_explicit(&workers->ticket, memory_order_relaxed)) != 0)
             return true;
-        sched_yield();
+        ascc_thread_yield();
     }
-    pthread_mutex_lock(&workers->lock);
+    ascc_lock_take(&workers->lock);
     atomic_fetch_add(&workers->sleepers, 1);
     while (!workers->stop && blocks_left(atomic_load(&workers->ticket)) == 0)
-        pthread_cond_wait(&workers->wake, &workers->lock);
+        ascc_condition_wait(&workers->wake, &workers->lock);
     atomic_fetch_sub(&workers->sleepers, 1);
     const bool stop = workers->stop;
-    pthread_mutex_unlock(&workers->lock);
+    ascc_lock_give(&workers->lock);
     return !stop;
 }
 
-static void *work(void *argument)
+static void work(void *argument)
 {
     const worker *const self = argument;
     while (wait_for_blocks(self->workers))
         take_blocks(self->workers, self->slot);
-    return NULL;
 }
 
 /* Wakes no more sleepers than there are blocks for. */
@@ -125,10 +124,10 @@ static void wake_sleepers(ascc_workers *workers, uint32_t blocks)
     const int32_t sleepers = atomic_load(&workers->sleepers);
     if (sleepers == 0)
         return;
-    pthread_mutex_lock(&workers->lock);
+    ascc_lock_take(&workers->lock);
     for (int32_t i = 0; i < sleepers && (uint32_t)i + 1 < blocks; i++)
-        pthread_cond_signal(&workers->wake);
-    pthread_mutex_unlock(&workers->lock);
+        ascc_condition_wake_one(&workers->wake);
+    ascc_lock_give(&workers->lock);
 }
 
 /* Waits for blocks that other workers still have in hand. */
@@ -137,14 +136,14 @@ static void wait_for_done(ascc_workers *workers, uint32_t blocks)
     for (int turn = 0; turn < IDLE_TURNS; turn++) {
         if (atomic_load_explicit(&workers->done, memory_order_acquire) == blocks)
             return;
-        sched_yield();
+        ascc_thread_yield();
     }
-    pthread_mutex_lock(&workers->lock);
+    ascc_lock_take(&workers->lock);
     atomic_store(&workers->caller_sleeps, true);
     while (atomic_load(&workers->done) != blocks)
-        pthread_cond_wait(&workers->finished, &workers->lock);
+        ascc_condition_wait(&workers->finished, &workers->lock);
     atomic_store(&workers->caller_sleeps, false);
-    pthread_mutex_unlock(&workers->lock);
+    ascc_lock_give(&workers->lock);
 }
 
 /* ---- The host's job system ------------------------------------------------------------------- */
@@ -161,7 +160,7 @@ static bool start_threads(ascc_workers *workers)
     while (workers->started < workers->thread_count - 1) {
         worker *const next = &workers->own[workers->started];
         *next = (worker){.workers = workers, .slot = workers->started + 1};
-        if (pthread_create(&next->thread, NULL, work, next) != 0)
+        if (!ascc_thread_start(&next->thread, work, next))
             return false;
         workers->started++;
     }
@@ -170,14 +169,14 @@ static bool start_threads(ascc_workers *workers)
 
 static bool open_locks(ascc_workers *workers)
 {
-    if (pthread_mutex_init(&workers->lock, NULL) != 0)
+    if (!ascc_lock_open(&workers->lock))
         return false;
-    if (pthread_cond_init(&workers->wake, NULL) == 0) {
-        if (pthread_cond_init(&workers->finished, NULL) == 0)
+    if (ascc_condition_open(&workers->wake)) {
+        if (ascc_condition_open(&workers->finished))
             return true;
-        pthread_cond_destroy(&workers->wake);
+        ascc_condition_close(&workers->wake);
     }
-    pthread_mutex_destroy(&workers->lock);
+    ascc_lock_close(&workers->lock);
     return false;
 }
 
@@ -229,15 +228,15 @@ void ascc_workers_destroy(ascc_workers **workers)
     if (old == NULL)
         return;
     *workers = NULL;
-    pthread_mutex_lock(&old->lock);
+    ascc_lock_take(&old->lock);
     old->stop = true;
-    pthread_cond_broadcast(&old->wake);
-    pthread_mutex_unlock(&old->lock);
+    ascc_condition_wake_all(&old->wake);
+    ascc_lock_give(&old->lock);
     for (int32_t i = 0; i < old->started; i++)
-        pthread_join(old->own[i].thread, NULL);
-    pthread_cond_destroy(&old->finished);
-    pthread_cond_destroy(&old->wake);
-    pthread_mutex_destroy(&old->lock);
+        ascc_thread_join(&old->own[i].thread);
+    ascc_condition_close(&old->finished);
+    ascc_condition_close(&old->wake);
+    ascc_lock_close(&old->lock);
     const ascc_allocator allocator = old->allocator;
     ascc_release(&allocator, old, 1, old->size);
 }

@@ -1,6 +1,7 @@
 /* Writes a file whole or not at all: beside its place, synced, renamed.
  * SPDX-License-Identifier: MIT */
 #include "write_file.h"
+#include "paths.h"
 
 #include <errno.h>
 #include <fcntl.h>
@@ -9,7 +10,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#define PATH_SIZE 4096
+#define PATH_SIZE ASCC_PATH_SIZE
 #define MAX_LINKS 40
 #define MAX_TRIES 1000
 #define MAX_WRITE ((size_t)1 << 30) /* bytes that every system takes at once */
@@ -18,8 +19,38 @@
 /* The systems differ here alone. */
 #if defined(_WIN32)
 #include <windows.h>
-#define NEW_FILE (O_WRONLY | O_CREAT | O_EXCL | O_BINARY)
 #define OUR_MODE (S_IREAD | S_IWRITE)
+
+static bool look(const char *path, struct stat *about)
+{
+    wchar_t wide[PATH_SIZE];
+    struct _stat64 found;
+    if (!ascc_path_wide(path, wide) || _wstat64(wide, &found) != 0)
+        return false;
+    about->st_mode = found.st_mode;
+    return true;
+}
+
+static bool may_write(const char *path)
+{
+    wchar_t wide[PATH_SIZE];
+    return ascc_path_wide(path, wide) && _waccess(wide, W_OK) == 0;
+}
+
+static int make_file(const char *path, int mode)
+{
+    wchar_t wide[PATH_SIZE];
+    return ascc_path_wide(path, wide)
+               ? _wopen(wide, O_WRONLY | O_CREAT | O_EXCL | O_BINARY | O_NOINHERIT, mode & OUR_MODE)
+               : -1;
+}
+
+static void discard(const char *path)
+{
+    wchar_t wide[PATH_SIZE];
+    if (ascc_path_wide(path, wide))
+        (void)_wunlink(wide);
+}
 
 static bool follow_links(char path[PATH_SIZE])
 {
@@ -48,14 +79,36 @@ static bool open_folder(const char *path, int *folder)
 
 static bool replace(const char *part, const char *path)
 {
-    if (MoveFileExA(part, path, MOVEFILE_REPLACE_EXISTING | MOVEFILE_WRITE_THROUGH))
+    wchar_t from[PATH_SIZE], to[PATH_SIZE];
+    if (!ascc_path_wide(part, from) || !ascc_path_wide(path, to))
+        return false;
+    if (MoveFileExW(from, to, MOVEFILE_REPLACE_EXISTING | MOVEFILE_WRITE_THROUGH))
         return true;
     errno = GetLastError() == ERROR_ACCESS_DENIED ? EACCES : EIO;
     return false;
 }
 #else
-#define NEW_FILE (O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC | O_NOFOLLOW)
 #define OUR_MODE 0666
+
+static bool look(const char *path, struct stat *about)
+{
+    return stat(path, about) == 0;
+}
+
+static bool may_write(const char *path)
+{
+    return access(path, W_OK) == 0;
+}
+
+static int make_file(const char *path, int mode)
+{
+    return open(path, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC | O_NOFOLLOW, mode);
+}
+
+static void discard(const char *path)
+{
+    (void)unlink(path);
+}
 
 /* Path of what a chain of links leads to, which need not be there. */
 static bool follow_links(char path[PATH_SIZE])
@@ -113,6 +166,16 @@ typedef struct place {
     bool there;
 } place;
 
+/* The last part of a path; what goes before names its folder, separator included. */
+static const char *name_of(const char *path)
+{
+    const char *name = path;
+    for (const char *at = path; *at; at++)
+        if (strchr(ASCC_PATH_SEPARATORS, *at))
+            name = at + 1;
+    return name;
+}
+
 /* Is there room for a file? Sets errno, or *why, when there is not. */
 static bool find_place(place *p, const char *path, const char **why)
 {
@@ -122,7 +185,7 @@ static bool find_place(place *p, const char *path, const char **why)
     }
     strcpy(p->path, path);
     struct stat about;
-    p->there = stat(path, &about) == 0;
+    p->there = look(path, &about);
     if (p->there && S_ISDIR(about.st_mode)) {
         errno = EISDIR;
         return false;
@@ -133,29 +196,27 @@ static bool find_place(place *p, const char *path, const char **why)
         return false;
     }
     p->mode = p->there ? about.st_mode & 0777u : 0u;
-    if (!follow_links(p->path) || (p->there && access(path, W_OK) != 0))
+    if (!follow_links(p->path) || (p->there && !may_write(path)))
         return false;
-    const char *slash = strrchr(p->path, '/');
-    const int length = slash ? (int)(slash - p->path) : 0;
-    (void)snprintf(p->folder, sizeof p->folder, "%.*s", length, p->path);
-    if (!length)
-        strcpy(p->folder, slash ? "/" : ".");
+    const size_t length = (size_t)(name_of(p->path) - p->path);
+    (void)snprintf(p->folder, sizeof p->folder, "%.*s", (int)length, p->path);
+    if (length == 0)
+        strcpy(p->folder, ".");
     return true;
 }
 
 /* A new file beside, under a name that nobody else has. */
 static int open_part(place *p)
 {
-    const char *slash = strrchr(p->path, '/');
-    const char *name = slash ? slash + 1 : p->path;
+    const char *name = name_of(p->path);
     for (int i = 0; i < MAX_TRIES; i++) {
-        const int length = snprintf(p->part, sizeof p->part, "%s/%.200s.%ld.%d.part", p->folder,
-                                    name, (long)getpid(), i);
+        const int length = snprintf(p->part, sizeof p->part, "%.*s%.200s.%ld.%d.part",
+                                    (int)(name - p->path), p->path, name, (long)getpid(), i);
         if (length < 0 || (size_t)length >= sizeof p->part) {
             errno = ENAMETOOLONG;
             return -1;
         }
-        const int file = open(p->part, NEW_FILE, p->there ? (int)p->mode : OUR_MODE);
+        const int file = make_file(p->part, p->there ? (int)p->mode : OUR_MODE);
         if (file >= 0 || (errno != EEXIST && errno != EINTR))
             return file;
     }
@@ -236,7 +297,7 @@ static bool write_file(const char *path, const ascc_bytes *piece, size_t count, 
     if (fill(file, piece, count) && put_in_place(&p, why))
         return true;
     const int reason = errno;
-    (void)unlink(p.part); /* not there any more if it has its place */
+    discard(p.part); /* not there any more if it has its place */
     errno = reason;
     return false;
 }

@@ -207,5 +207,6 @@ void ascc_kernels_portable(ascc_kernels *kernels);
 void ascc_kernels_avx2(ascc_kernels *kernels);
 void ascc_kernels_avx512(ascc_kernels *kernels);
 void ascc_kernels_neon(ascc_kernels *kernels);
+void ascc_kernels_simd128(ascc_kernels *kernels);
 
 #endif

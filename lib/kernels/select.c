@@ -21,6 +21,9 @@ uint32_t ascc_kernels_available(void)
 #if defined(ASCC_HAVE_NEON)
     cpu |= ASCC_CPU_NEON; /* every aarch64 has it */
 #endif
+#if defined(ASCC_HAVE_SIMD128)
+    cpu |= ASCC_CPU_SIMD128; /* else the engine would not have taken the module */
+#endif
     return cpu;
 }
 
@@ -39,5 +42,9 @@ void ascc_kernels_select(ascc_kernels *kernels, uint32_t cpu)
 #if defined(ASCC_HAVE_NEON)
     if (cpu & ASCC_CPU_NEON)
         ascc_kernels_neon(kernels);
+#endif
+#if defined(ASCC_HAVE_SIMD128)
+    if (cpu & ASCC_CPU_SIMD128)
+        ascc_kernels_simd128(kernels);
 #endif
 }

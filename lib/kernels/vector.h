@@ -3,7 +3,7 @@
  *
  * Every operation is elementwise and correctly rounded, so the bits are those of eight scalars. The
  * file of a variant picks its branch, whatever the compiler's flags allow, with ASCC_USE_AVX2 (AVX2 and
- * FMA) or ASCC_USE_NEON; without either it is plain C.
+ * FMA), ASCC_USE_NEON or ASCC_USE_SIMD128 (WebAssembly); without any it is plain C.
  */
 #ifndef ASCC_VECTOR_H
 #define ASCC_VECTOR_H
@@ -253,6 +253,123 @@ static inline void store_whole(int32_t *p, vector a)
     vst1q_s32(p + 4, vcvtq_s32_f32(a.high));
 }
 
+#elif defined(ASCC_USE_SIMD128)
+#include <wasm_simd128.h>
+
+#include "fused.h"
+
+typedef struct vector {
+    v128_t low, high;
+} vector;
+
+static inline vector load(const float *p)
+{
+    return (vector){wasm_v128_load(p), wasm_v128_load(p + 4)};
+}
+
+static inline void store(float *p, vector a)
+{
+    wasm_v128_store(p, a.low);
+    wasm_v128_store(p + 4, a.high);
+}
+
+static inline vector fill(float a)
+{
+    return (vector){wasm_f32x4_splat(a), wasm_f32x4_splat(a)};
+}
+
+static inline vector add(vector a, vector b)
+{
+    return (vector){wasm_f32x4_add(a.low, b.low), wasm_f32x4_add(a.high, b.high)};
+}
+
+static inline vector times(vector a, vector b)
+{
+    return (vector){wasm_f32x4_mul(a.low, b.low), wasm_f32x4_mul(a.high, b.high)};
+}
+
+static inline vector minus(vector a, vector b)
+{
+    return (vector){wasm_f32x4_sub(a.low, b.low), wasm_f32x4_sub(a.high, b.high)};
+}
+
+static inline vector larger(vector a, vector b)
+{
+    return (vector){wasm_f32x4_pmax(b.low, a.low), wasm_f32x4_pmax(b.high, a.high)};
+}
+
+static inline vector smaller(vector a, vector b)
+{
+    return (vector){wasm_f32x4_pmin(b.low, a.low), wasm_f32x4_pmin(b.high, a.high)};
+}
+
+static inline vector whole(vector a)
+{
+    return (vector){wasm_f32x4_trunc(a.low), wasm_f32x4_trunc(a.high)};
+}
+
+static inline void store_whole(int32_t *p, vector a)
+{
+    wasm_v128_store(p, wasm_i32x4_trunc_sat_f32x4(a.low));
+    wasm_v128_store(p + 4, wasm_i32x4_trunc_sat_f32x4(a.high));
+}
+
+/* a * b + c of two lanes, rounded to double: the product is exact there. */
+static inline v128_t sum_in_double(v128_t a, v128_t b, v128_t c)
+{
+    return wasm_f64x2_add(
+        wasm_f64x2_mul(wasm_f64x2_promote_low_f32x4(a), wasm_f64x2_promote_low_f32x4(b)),
+        wasm_f64x2_promote_low_f32x4(c));
+}
+
+static inline v128_t upper_lanes(v128_t a)
+{
+    return wasm_i32x4_shuffle(a, a, 2, 3, 2, 3);
+}
+
+/* Four lanes of fused, from sums in double. Rounding twice is rounding once unless the double lies on a midpoint
+ * of floats: the exact sum, off it by less than the double's last digit, may belong to the other side. A midpoint
+ * ends in 1 and 28 zeros, which sets lanes of *middle, or the result is subnormal: then lanes of *size, twice its
+ * bits less 1, are small. Zeros, the largest there, are right: what rounds to zero is exact as a double. */
+static inline v128_t round_sums(v128_t low, v128_t high, v128_t *middle, v128_t *size)
+{
+    const v128_t result = wasm_i32x4_shuffle(wasm_f32x4_demote_f64x2_zero(low),
+                                             wasm_f32x4_demote_f64x2_zero(high), 0, 1, 4, 5);
+    const v128_t digits = wasm_i32x4_shl(wasm_i32x4_shuffle(low, high, 0, 2, 4, 6), 3);
+    *middle = wasm_i32x4_eq(digits, wasm_i32x4_splat(INT32_MIN));
+    *size = wasm_i32x4_sub(wasm_i32x4_shl(result, 1), wasm_i32x4_splat(1));
+    return result;
+}
+
+/* The long way, which is always right. */
+static __attribute__((noinline)) vector fused_again(vector a, vector b, vector c)
+{
+    float x[LANES], y[LANES], z[LANES];
+    store(x, a);
+    store(y, b);
+    store(z, c);
+    for (int i = 0; i < LANES; i++)
+        z[i] = fused_in_double(x[i], y[i], z[i]);
+    return load(z);
+}
+
+static inline vector fused(vector a, vector b, vector c)
+{
+    const v128_t s0 = sum_in_double(a.low, b.low, c.low);
+    const v128_t s1 = sum_in_double(upper_lanes(a.low), upper_lanes(b.low), upper_lanes(c.low));
+    const v128_t s2 = sum_in_double(a.high, b.high, c.high);
+    const v128_t s3 = sum_in_double(upper_lanes(a.high), upper_lanes(b.high), upper_lanes(c.high));
+    vector middle, size, result;
+    result.low = round_sums(s0, s1, &middle.low, &size.low);
+    result.high = round_sums(s2, s3, &middle.high, &size.high);
+    const v128_t subnormal = wasm_u32x4_le(wasm_u32x4_min(size.low, size.high),
+                                           wasm_i32x4_splat(0x00ffffff)); /* 2^-126, too */
+    if (__builtin_expect(
+            wasm_v128_any_true(wasm_v128_or(wasm_v128_or(middle.low, middle.high), subnormal)), 0))
+        return fused_again(a, b, c);
+    return result;
+}
+
 #else
 #include "fused.h"
 
@@ -373,7 +490,15 @@ static inline void store_more(int32_t *p, vector a, int32_t b)
     for (int i = 0; i < LANES; i++)
         p[i] = (int32_t)(bits[i] - (uint32_t)b);
 }
+#endif
 
+#if defined(ASCC_USE_SIMD128)
+static inline vector gather_lanes(const float *p, const uint32_t *i)
+{
+    return (vector){wasm_f32x4_make(p[i[0]], p[i[1]], p[i[2]], p[i[3]]),
+                    wasm_f32x4_make(p[i[4]], p[i[5]], p[i[6]], p[i[7]])};
+}
+#elif !defined(ASCC_USE_AVX2)
 static inline vector gather_lanes(const float *p, const uint32_t *index)
 {
     float lane[LANES];
@@ -381,7 +506,9 @@ static inline vector gather_lanes(const float *p, const uint32_t *index)
         lane[i] = p[index[i]];
     return load(lane);
 }
+#endif
 
+#if !defined(ASCC_USE_AVX2)
 static inline unsigned not_zero(vector a, vector b, vector c)
 {
     float lane[3][LANES];
@@ -472,6 +599,31 @@ static inline void transpose_lanes(vector a[LANES])
         a[i] = _mm256_permute2f128_ps(c[i], c[4 + i], 0x20);
         a[4 + i] = _mm256_permute2f128_ps(c[i], c[4 + i], 0x31);
     }
+#elif defined(ASCC_USE_SIMD128)
+    for (int i = 0; i < LANES; i += 4)
+        for (int half = 0; half < 2; half++) {
+            v128_t row[4], pair[4];
+            for (int j = 0; j < 4; j++)
+                row[j] = half ? a[i + j].high : a[i + j].low;
+            pair[0] = wasm_i32x4_shuffle(row[0], row[1], 0, 4, 1, 5);
+            pair[1] = wasm_i32x4_shuffle(row[0], row[1], 2, 6, 3, 7);
+            pair[2] = wasm_i32x4_shuffle(row[2], row[3], 0, 4, 1, 5);
+            pair[3] = wasm_i32x4_shuffle(row[2], row[3], 2, 6, 3, 7);
+            for (int j = 0; j < 4; j++) {
+                const v128_t x = pair[j / 2], y = pair[2 + j / 2];
+                const v128_t column =
+                    j % 2 ? wasm_i64x2_shuffle(x, y, 1, 3) : wasm_i64x2_shuffle(x, y, 0, 2);
+                if (half)
+                    a[i + j].high = column;
+                else
+                    a[i + j].low = column;
+            }
+        }
+    for (int j = 0; j < 4; j++) { /* the two squares off the diagonal change places */
+        const v128_t square = a[j].high;
+        a[j].high = a[4 + j].low;
+        a[4 + j].low = square;
+    }
 #else
     float from[LANES][LANES], to[LANES][LANES];
     for (int i = 0; i < LANES; i++)
@@ -515,6 +667,10 @@ static inline float total(vector a)
     const __m128 four = _mm_add_ps(_mm256_castps256_ps128(a), _mm256_extractf128_ps(a, 1));
     const __m128 two = _mm_add_ps(four, _mm_movehl_ps(four, four));
     return _mm_cvtss_f32(_mm_add_ss(two, _mm_shuffle_ps(two, two, 1)));
+#elif defined(ASCC_USE_SIMD128)
+    const v128_t four = wasm_f32x4_add(a.low, a.high);
+    const v128_t two = wasm_f32x4_add(four, upper_lanes(four));
+    return wasm_f32x4_extract_lane(two, 0) + wasm_f32x4_extract_lane(two, 1);
 #else
     float l[LANES];
     store(l, a);

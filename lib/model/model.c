@@ -2,6 +2,7 @@
 #include "model.h"
 #include "cost.h"
 #include "description.h"
+#include "file/paths.h"
 #include "file/safetensors.h"
 #include "file/write_file.h"
 
@@ -200,7 +201,7 @@ ascc_status ascc_model_load(ascc_context *context, const char *path, ascc_model 
     ascc_status status = begin_load(context, path, model);
     if (status != ASCC_OK)
         return status;
-    FILE *file = fopen(path, "rb");
+    FILE *file = ascc_path_open(path);
     if (!file) {
         ascc_fail(&message, ASCC_ERROR_FILE, "model: cannot open '%s': %s", path, strerror(errno));
         return ascc_context_fail(context, ASCC_ERROR_FILE, &message);

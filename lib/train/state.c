@@ -5,6 +5,7 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "file/paths.h"
 #include "file/write_file.h"
 #include "trainer.h"
 
@@ -223,7 +224,7 @@ ascc_status ascc_trainer_load(ascc_trainer *t, const char *path)
         return ASCC_ERROR_ARGUMENT;
     if (!path)
         return FAIL(ASCC_ERROR_ARGUMENT, "trainer: a NULL argument");
-    FILE *stream = fopen(path, "rb");
+    FILE *stream = ascc_path_open(path);
     if (!stream)
         return FAIL(ASCC_ERROR_FILE, "cannot open '%s': %s", path, strerror(errno));
     const size_t most = 16 * t->parameter_count + 4 * t->whitening.number_count + 65536;
