@@ -39,7 +39,8 @@ same() {
 }
 
 for dimension in 2d 3d; do
-    for model in water$dimension water$dimension-tiny; do
+    for model in water$dimension water$dimension-tiny water$dimension-large; do
+        [ $model = water2d-large ] && continue
         file=examples/models/$model.safetensors
         most=60000
         [ $model = water$dimension-tiny ] && most=15000

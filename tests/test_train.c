@@ -477,7 +477,7 @@ static void same_seed_gives_the_same_weights_for_any_threads(void **state)
     }
 }
 
-static void a_sequence_may_have_fewer_steps_before_those_with_gradient(void **state)
+static void a_sequence_may_have_fewer_steps_before_and_noise_of_its_own(void **state)
 {
     (void)state;
     static const ascc_training_stage many = {
@@ -503,6 +503,18 @@ static void a_sequence_may_have_fewer_steps_before_those_with_gradient(void **st
     assert_memory_not_equal(x, y, ascc_trainer_parameter_count(a) * sizeof *x);
     free(x);
     free(y);
+    m->sequence.jitter = 0.1;
+    ascc_trainer *noisy = open_trainer(&o, &random, m);
+    iterate(noisy, 3);
+    float *z = parameters_of(noisy);
+    float *of_b = parameters_of(b);
+    assert_memory_not_equal(z, of_b, ascc_trainer_parameter_count(a) * sizeof *z);
+    free(z);
+    free(of_b);
+    ascc_trainer_destroy(&noisy);
+    m->sequence.jitter = -0.1;
+    assert_int_equal(ascc_trainer_add_sequence(b, &m->sequence), ASCC_ERROR_ARGUMENT);
+    m->sequence.jitter = 0.0;
     m->sequence.warm_up = -1;
     assert_int_equal(ascc_trainer_add_sequence(b, &m->sequence), ASCC_ERROR_ARGUMENT);
     ascc_trainer_destroy(&a);
@@ -943,7 +955,7 @@ int main(void)
         cmocka_unit_test(gradients_of_penalties_are_right),
         cmocka_unit_test(gradients_through_the_relaxation_are_right),
         cmocka_unit_test(same_seed_gives_the_same_weights_for_any_threads),
-        cmocka_unit_test(a_sequence_may_have_fewer_steps_before_those_with_gradient),
+        cmocka_unit_test(a_sequence_may_have_fewer_steps_before_and_noise_of_its_own),
         cmocka_unit_test(the_hosts_floating_point_environment_changes_no_weight),
         cmocka_unit_test(going_on_from_a_saved_state_gives_the_same_bits),
         cmocka_unit_test(a_sequence_with_a_nan_is_refused_by_name),

@@ -112,9 +112,10 @@ static int describe_model(const char *path)
 int ascc_command_info(int argc, char **argv)
 {
     if (argc == 1 && strcmp(argv[0], "--help") == 0) {
-        fputs("usage: ascc info FILE\n\n"
-              "FILE is a model by name (water3d) or file, a published network or a sequence file.\n",
-              stdout);
+        fputs(
+            "usage: ascc info FILE\n\n"
+            "FILE is a model by name (water3d) or file, a published network or a sequence file.\n",
+            stdout);
         return 0;
     }
     if (argc != 1)

@@ -1,5 +1,5 @@
 #!/bin/sh
-# Makes what 3D networks learn from in examples/train/runs/data3d: the scenes of water3d beside the given ones, seconds;
+# Makes what 3D networks learn from in examples/train/runs/data3d: the scenes of water3d beside the given ones, minutes;
 # and a set over the whole range, with configs that train from it alone (runs/plain), about 0.4 core-hours.
 # SPDX-License-Identifier: MIT
 # sh examples/train/data3d.sh [PROGRAM [SHARE [THREADS]]]     SHARE: per cent of the set over the range (100)
@@ -12,6 +12,8 @@ out=runs/data3d
 mkdir -p "$out"
 "$ascc" generate droplets -o "$out" --dimension 3 --seed 6 --count 3 --frames 80 --spacing 0.05 --solver sph
 "$ascc" generate free-fall -o "$out" --dimension 3 --seed 5 --count 2 --frames 40 --spacing 0.05 --solver sph
+"$ascc" generate still-tank -o "$out" --dimension 3 --seed 77 --count 8 --frames 60 --spacing 0.05
+"$ascc" generate still-column -o "$out" --dimension 3 --seed 77 --count 2 --frames 60 --spacing 0.05
 
 . ./range.sh
 kind liquid3d 30
