@@ -297,10 +297,13 @@ class context
 class model
 {
   public:
-    model(const context &owner, const std::string &path) : context_(owner)
+    /// By its path or, in the folders of ascc_model_find, by its name.
+    model(const context &owner, const std::string &name) : context_(owner)
     {
+        char path[4096];
         ascc_model *made = nullptr;
-        context_.check(ascc_model_load(context_.get(), path.c_str(), &made));
+        context_.check(ascc_model_find(context_.get(), name.c_str(), path, sizeof path));
+        context_.check(ascc_model_load(context_.get(), path, &made));
         handle_.reset(made);
     }
     model(const context &owner, const void *data, std::size_t size) : context_(owner)

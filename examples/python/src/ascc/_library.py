@@ -279,10 +279,6 @@ def _load() -> ctypes.CDLL:
     )
 
 
-# What a library of this version may not have.
-NEWER = ("model_find",)
-
-
 class _Library:
     """The functions of ascc.h by their names without ascc_."""
 
@@ -292,8 +288,6 @@ class _Library:
             try:
                 function = getattr(loaded, "ascc_" + name)
             except AttributeError:
-                if name in NEWER:
-                    continue
                 raise ImportError("%s has no ascc_%s" % (loaded._name, name)) from None
             function.restype, function.argtypes = result, arguments
             setattr(self, name, function)

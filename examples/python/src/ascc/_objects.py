@@ -215,11 +215,10 @@ class Model(_Handle):
 
         def load(c: Any, handle: Any) -> int:
             found = ctypes.create_string_buffer(4096)
-            if hasattr(library, "model_find"):
-                status: int = library.model_find(c, coded, found, len(found))
-                if status != Status.OK:
-                    return status
-            return int(library.model_load(c, found.value or coded, handle))
+            status: int = library.model_find(c, coded, found, len(found))
+            if status != Status.OK:
+                return status
+            return int(library.model_load(c, found.value, handle))
 
         self._open(context, load)
 
