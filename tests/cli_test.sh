@@ -71,7 +71,7 @@ words='sim demo dam-break-2d --size 6'
     refuses 2 "one argument too many: more" $words more -n 1
     refuses 1 "lake: neither a file nor a scene's name" sim demo lake-2d -n 1
     refuses 1 "lake: No such file" sim demo lake -n 1
-    refuses 1 "cannot open 'none': No such file" sim none dam-break-2d -n 1
+    refuses 1 "cannot open 'none', and no folder of models has 'none.safetensors'" sim none dam-break-2d -n 1
     refuses 1 "/nowhere/o: cannot be written: No such file" $words -n 1 -o /nowhere/o
     refuses 1 "/nowhere/f: No such file" $words -n 1 --frames /nowhere/f
     refuses 1 "/nowhere/p: No such file" $words -n 1 --ply /nowhere/p
@@ -80,7 +80,7 @@ words='sim demo dam-break-2d --size 6'
     refuses 2 "a SEQUENCE and -o DIR are wanted" show
     refuses 2 "--every 0: no value that it takes" show none -o shown --every 0
     refuses 1 "none: No such file" show none -o shown
-    refuses 1 "No such file" info none
+    refuses 1 "no folder of models has 'none.safetensors'" info none
     refuses 1 "is no regular file" info .
     printf 'not a model' >text
     refuses 1 "neither a model nor a sequence" info text

@@ -335,7 +335,7 @@ static void options_of_the_generator_arrive(void **state)
                              "3",
                              "--spacing",
                              "0.025",
-                             "--frame",
+                             "--interval",
                              "0.004",
                              "--gravity",
                              "0.5",

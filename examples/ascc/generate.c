@@ -37,11 +37,11 @@ static void usage(void)
         stdout,
         "usage: ascc generate KIND -o DIR [--seed S] [--count N] [--threads T] [--frames F]\n"
         "                     [--dimension 2|3] [--spacing METRES] [--all-velocities]\n"
-        "                     [--solver dfsph|sph] [--frame SECONDS] [--gravity TIMES]\n\n"
+        "                     [--solver dfsph|sph] [--interval SECONDS] [--gravity TIMES]\n\n"
         "Writes DIR/KIND_S_0000.safetensors and on. Files that exist are kept, so that the same\n"
         "command goes on where it was stopped. The same seed gives the same bytes for any T.\n"
         "dfsph, the default, is DFSPH as the given 3D sequences were made with; sph is weakly\n"
-        "compressible SPH. --frame is the time between frames, --gravity a factor of the "
+        "compressible SPH. --interval is the time between frames, --gravity a factor of the "
         "kind's.\n\n");
     for (size_t k = 0; recipe_kinds[k][0]; k++)
         fprintf(stdout, "  %-13s %s\n", recipe_kinds[k][0], recipe_kinds[k][1]);
@@ -237,7 +237,7 @@ static bool take_option(request *q, const char *name, const char *value)
         q->recipe.solver = strcmp(value, "sph") == 0 ? RECIPE_SPH : RECIPE_DFSPH;
         return strcmp(value, "sph") == 0 || strcmp(value, "dfsph") == 0;
     }
-    if (strcmp(name, "--frame") == 0) {
+    if (strcmp(name, "--interval") == 0) {
         q->recipe.frame = strtod(value, &end);
         return *value && !*end && q->recipe.frame > 1e-6 && q->recipe.frame < 1e3;
     }
@@ -271,9 +271,9 @@ static void unknown_kind(const char *kind)
 
 int ascc_command_generate(int argc, char **argv)
 {
-    static const char *const options[] = {"-o",        "--seed",           "--count",
-                                          "--threads", "--frames",         "--dimension",
-                                          "--spacing", "--all-velocities", NULL};
+    static const char *const options[] = {
+        "-o",        "--seed",           "--count",  "--threads",  "--frames",  "--dimension",
+        "--spacing", "--all-velocities", "--solver", "--interval", "--gravity", NULL};
     request q = {.count = 1, .threads = 1};
     for (int i = 0; i < argc; i++) {
         if (strcmp(argv[i], "--help") == 0) {
