@@ -8,9 +8,9 @@
 #include "kernels.h"
 
 /* The loops of search() and, with cube, search_cube() in body.h, same operations in the same order. */
-static inline size_t search_lanes(const ascc_coordinates *points, size_t begin, size_t end,
-                                  int32_t x, int32_t y, int32_t z, float limit, int cube,
-                                  uint32_t *restrict found)
+static inline size_t search_run(const ascc_coordinates *points, size_t begin, size_t end, int32_t x,
+                                int32_t y, int32_t z, float limit, int cube,
+                                uint32_t *restrict found)
 {
     const v128_t qx = wasm_i32x4_splat(x), qy = wasm_i32x4_splat(y), qz = wasm_i32x4_splat(z);
     const v128_t limits = wasm_f32x4_splat(limit), one = wasm_f32x4_splat(1.0f);
@@ -52,17 +52,28 @@ static inline size_t search_lanes(const ascc_coordinates *points, size_t begin, 
     return count;
 }
 
-static size_t search_simd128(const ascc_coordinates *points, size_t begin, size_t end, int32_t x,
-                             int32_t y, int32_t z, float limit, uint32_t *restrict found)
+static inline size_t search_lanes(const ascc_coordinates *points, const ascc_run *runs, size_t n,
+                                  int32_t x, int32_t y, int32_t z, float limit, int cube,
+                                  uint32_t *restrict found)
 {
-    return search_lanes(points, begin, end, x, y, z, limit, 0, found);
+    size_t count = 0;
+    for (size_t r = 0; r < n; r++)
+        count +=
+            search_run(points, runs[r].begin, runs[r].end, x, y, z, limit, cube, found + count);
+    return count;
 }
 
-static size_t search_cube_simd128(const ascc_coordinates *points, size_t begin, size_t end,
+static size_t search_simd128(const ascc_coordinates *points, const ascc_run *runs, size_t n,
+                             int32_t x, int32_t y, int32_t z, float limit, uint32_t *restrict found)
+{
+    return search_lanes(points, runs, n, x, y, z, limit, 0, found);
+}
+
+static size_t search_cube_simd128(const ascc_coordinates *points, const ascc_run *runs, size_t n,
                                   int32_t x, int32_t y, int32_t z, float inverse,
                                   uint32_t *restrict found)
 {
-    return search_lanes(points, begin, end, x, y, z, inverse, 1, found);
+    return search_lanes(points, runs, n, x, y, z, inverse, 1, found);
 }
 
 #define SEARCH search_simd128

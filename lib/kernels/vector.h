@@ -303,6 +303,23 @@ static inline vector smaller(vector a, vector b)
     return (vector){wasm_f32x4_pmin(b.low, a.low), wasm_f32x4_pmin(b.high, a.high)};
 }
 
+static inline vector over(vector a, vector b)
+{
+    return (vector){wasm_f32x4_div(a.low, b.low), wasm_f32x4_div(a.high, b.high)};
+}
+
+static inline vector root(vector a)
+{
+    return (vector){wasm_f32x4_sqrt(a.low), wasm_f32x4_sqrt(a.high)};
+}
+
+static inline vector more_than(vector a, int32_t b)
+{
+    const v128_t from = wasm_i32x4_splat(b);
+    return (vector){wasm_f32x4_convert_i32x4(wasm_i32x4_sub(a.low, from)),
+                    wasm_f32x4_convert_i32x4(wasm_i32x4_sub(a.high, from))};
+}
+
 static inline vector whole(vector a)
 {
     return (vector){wasm_f32x4_trunc(a.low), wasm_f32x4_trunc(a.high)};
