@@ -27,7 +27,8 @@ typedef struct ascc_network {
     int32_t relaxation_key[2]; /* fluid and walls around the fluid; -1 = there is no relaxation */
     uint8_t *wants;            /* [value_count] ASCC_WANTS_* */
     int32_t max_neighbors;     /* of a point, before LIMIT */
-    bool keeps_values;         /* also those that readers are given tile by tile: for a way back */
+    bool
+        keeps_values; /* also those that readers are given tile by tile: for a way back, as all of a step then */
 } ascc_network;
 
 ascc_status ascc_network_create(ascc_network *network, const ascc_allocator *allocator,
@@ -118,6 +119,13 @@ static inline const ascc_rows *ascc_term_list(const ascc_network_run *run, const
                                               int list)
 {
     return &run->rows[run->network->term_key[ascc_plan_term_number(run->plan, term)][list]];
+}
+
+/* Areas that walls count by, their features' rows apart, in the order of their set; NULL = each counts once. */
+static inline const float *ascc_wall_areas(const ascc_network_run *run)
+{
+    const int32_t channel = ascc_plan_feature(run->plan, 1, ASCC_FEATURE_AREA);
+    return channel >= 0 ? run->value[1].raw + channel : NULL;
 }
 
 /* What the terms of a layer need at most. */

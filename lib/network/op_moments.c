@@ -127,13 +127,6 @@ static const float *vectors_of(const ascc_network_run *run, int list, size_t *st
     return run->value[list].raw + (list ? normal_channel(plan) : ascc_plan_motion(plan, 0));
 }
 
-/* What the numbers of a wall count, all but the normal, whose feature has it; NULL = once. */
-static const float *areas_of(const ascc_network_run *run, int list)
-{
-    const int32_t channel = ascc_plan_feature(run->plan, 1, ASCC_FEATURE_AREA);
-    return list && channel >= 0 ? run->value[1].raw + channel : NULL;
-}
-
 /* Moments of one row over one list, [bump][8]. */
 static void sum_row(const ascc_tile *tile, const ascc_term *term, int list, size_t row, float *sum)
 {
@@ -155,7 +148,8 @@ static void sum_row(const ascc_tile *tile, const ascc_term *term, int list, size
                                     run->hierarchy->place[0] + row * 4, (float)(1.0 / rows->radius),
                                     &pairs);
     run->tools->kernels->moments(&pairs, neighbor, count, vectors, stride, own, list, d,
-                                 areas_of(run, list), stride, (size_t)filter.bumps, sum);
+                                 list ? ascc_wall_areas(run) : NULL, stride, (size_t)filter.bumps,
+                                 sum);
 }
 
 /* The numbers of bumps, in a plane without those that it does not have. */
@@ -228,7 +222,7 @@ static void backward_pair(const ascc_reverse *pass, const ascc_term *term, int l
     size_t stride, own_stride;
     const float *vectors = vectors_of(run, list, &stride) + j * stride;
     const float *own = vectors_of(run, 0, &own_stride) + row * own_stride;
-    const float *areas = areas_of(run, list);
+    const float *areas = list ? ascc_wall_areas(run) : NULL;
     const double area = areas ? (double)areas[j * stride] : 1.0;
     double r[3], u[3] = {0.0, 0.0, 0.0}, relative[3] = {0.0, 0.0, 0.0}, q[8] = {area};
     ascc_seen_displacement(run, rows, row, j, r);

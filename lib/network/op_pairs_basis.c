@@ -289,14 +289,6 @@ static const int32_t *find_seen(const ascc_network_run *run, int32_t set)
 
 /* ---- Pairs ---- */
 
-/* Areas of walls, so far apart, in the order of their set; NULL: each counts once. */
-static const float *areas_of(const ascc_network_run *run, size_t *stride)
-{
-    const int32_t channel = ascc_plan_feature(run->plan, 1, ASCC_FEATURE_AREA);
-    *stride = ascc_padded(run->plan->boundary_channels);
-    return channel >= 0 ? run->value[1].raw + channel : NULL;
-}
-
 /* What pairs of a side read. */
 static ascc_lines lines_of(const coefficients *c, int side)
 {
@@ -314,8 +306,10 @@ static ascc_lines lines_of(const coefficients *c, int side)
                     .place = side == FLUID ? c->place : NULL,
                     .factor = c->scale->factor[0],
                     .limit = ascc_output_limit(&plan->output)};
-    if (side == WALLS)
-        l.area = areas_of(c->run, &l.area_stride);
+    if (side == WALLS) {
+        l.area = ascc_wall_areas(c->run);
+        l.area_stride = ascc_padded(plan->boundary_channels);
+    }
     if (term->tensor[2 * side + 1]) {
         l.a = ascc_padded(plan->fluid_channels);
         l.motion = c->run->value[0].raw + ascc_plan_motion(plan, 0);
@@ -491,9 +485,8 @@ static void find_pair(const ascc_pair_reverse *q, int part, const bumps_at *at, 
     a->strength = strength_of(q, part, a->i, a->j, a->both, at, &a->slope);
     a->damping = strength_of(q, part + 1, a->i, a->j, a->both, at, &a->damping_slope);
     if (!a->both) {
-        size_t stride;
-        const float *area = areas_of(p->run, &stride);
-        a->area = area ? (double)area[a->j * stride] : 1.0;
+        const float *area = ascc_wall_areas(p->run);
+        a->area = area ? (double)area[a->j * ascc_padded(plan->boundary_channels)] : 1.0;
         a->strength *= a->area;
         a->slope *= a->area;
         a->damping *= a->area;
