@@ -21,8 +21,6 @@
 #define FARTHEST (((int64_t)1 << 30) - ((int64_t)1 << 27))
 /* Compressions are summed in integers. */
 #define COMPRESSION_UNIT 0x1p-24
-/* At a free surface, where density lacks more than this, a divergence means nothing. */
-#define SURFACE 0.35f
 
 /* Rows are those of ASCC_SET_FLUID. Vectors are three arrays. */
 typedef struct relaxation {
@@ -251,7 +249,7 @@ static void find_divergence(relaxation *r, size_t begin, size_t end)
 {
     const ascc_gradients pairs = gradients(r);
     for (size_t i = begin; i < end; i++)
-        if (r->excess[i] < -SURFACE)
+        if (r->excess[i] < -ASCC_SURFACE)
             r->response[i] = 0.0f;
     r->state->tools.kernels->divergence(&pairs, begin, end, r->own, r->move, r->excess);
 }
@@ -590,7 +588,7 @@ static bool keep_positions(ascc_step_state *state)
 {
     const ascc_particles *p = state->particles;
     const size_t numbers = p->fluid_count * (size_t)p->dimension;
-    if (!state->keeps_relaxed)
+    if (!state->network->keeps_values)
         return true;
     double *to = ascc_arena_take(state->tools.arena, numbers, sizeof *to);
     if (to)
@@ -603,7 +601,7 @@ static bool keep_velocities(ascc_step_state *state)
 {
     const ascc_particles *p = state->particles;
     const size_t d = (size_t)p->dimension, numbers = p->fluid_count * d;
-    if (!state->keeps_relaxed)
+    if (!state->network->keeps_values)
         return true;
     double *to = ascc_arena_take(state->tools.arena, numbers, sizeof *to);
     for (size_t k = 0; to && k < numbers; k++)

@@ -29,6 +29,9 @@ typedef struct ascc_advance {
     int64_t *external; /* impulse of gravity and acceleration, quanta */
 } ascc_advance;
 
+/* At a free surface, where density lacks more than this, a divergence means nothing. */
+#define ASCC_SURFACE 0.35f
+
 /* What the relaxation began with, kept for a way back: [fluid count][dimension], host's units, or NULL. */
 typedef struct ascc_relaxed {
     double *position; /* where the network left the particles */
@@ -45,7 +48,6 @@ typedef struct ascc_step_state {
     size_t *expected;                                     /* of the network's neighbour lists */
     ascc_status (*engine)(struct ascc_step_state *state); /* engine.h */
     ascc_wall_volumes *walls;
-    bool keeps_relaxed; /* below */
     ascc_search_tools tools;
     ascc_step_statistics *statistics; /* also the times of stages */
     double since;                     /* when the stage under way began, s */

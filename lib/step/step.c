@@ -221,7 +221,6 @@ ascc_status ascc_step_once(ascc_step *step, ascc_particles *p, const ascc_motion
         .expected = step->expected,
         .engine = step->engine,
         .walls = &step->walls,
-        .keeps_relaxed = step->keeps_relaxed,
         .tools = {arena, step->context->workers, &step->context->kernels, &step->message},
         .statistics = &step->statistics,
         .since = ascc_clock()};

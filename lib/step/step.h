@@ -17,7 +17,6 @@ struct ascc_step {
     ascc_engine engine;
     ascc_arena arena;
     ascc_wall_volumes walls;
-    bool keeps_relaxed;   /* in the state of a step, for the trainer */
     double *acceleration; /* the host's, [fluid][dimension] */
     size_t acceleration_capacity;
     unsigned char *kept; /* the state before the first of several substeps */

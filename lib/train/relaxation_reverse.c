@@ -10,9 +10,6 @@
 #include <math.h>
 #include <string.h>
 
-/* At a free surface a divergence means nothing, as in step/relaxation.c. */
-#define SURFACE 0.35
-
 /* A neighbour of a row, in supports. */
 typedef struct neighbor {
     size_t at;  /* fluid row, or wall row */
@@ -490,7 +487,7 @@ static ascc_status divergence_back(const ascc_step_state *state, ascc_arena *are
     gather(&r, gradients->velocity, 1.0 / step, by);
     gather(&r, state->relaxed.velocity, step, move);
     for (size_t i = 0; i < r.count; i++)
-        if (r.excess[i] < -SURFACE)
+        if (r.excess[i] < -(double)ASCC_SURFACE)
             r.response[i] = 0.0;
     divergence(&r, move, r.excess);
     sweep(&r);

@@ -14,7 +14,7 @@ typedef struct ascc_relaxation_gradients {
     double *by_before; /* += gradient of `before`, which corrections may lie along */
 } ascc_relaxation_gradients;
 
-/* Of a step that kept what its relaxation began with (ascc_step_state.keeps_relaxed). Exact but where sweeps
+/* Of a step that kept what its relaxation began with (ascc_network.keeps_values). Exact but where sweeps
  * clamp, pairs are limited or neighbours change; contact counts as if there were none. errors: MEMORY. */
 ascc_status ascc_relaxation_backward(const ascc_step_state *state, ascc_arena *arena,
                                      const ascc_relaxation_gradients *gradients);

@@ -24,7 +24,6 @@ bool ascc_rollout_worker_open(ascc_rollout_worker *w, ascc_context *context,
     for (size_t i = 0; w->kept && i < w->kept_count; i++)
         ascc_arena_open(&w->kept[i], &context->allocator);
     if (w->kept && w->state && ascc_step_create(context, model, NULL, &w->step) == ASCC_OK) {
-        w->step->keeps_relaxed = true;
         w->step->network.keeps_values = true;
         return true;
     }
