@@ -4,31 +4,8 @@
 cd "$(dirname "$0")/.." || exit 1
 build=${1:-build}
 source=$PWD
-number=0
-failed=0
-folder=$(mktemp -d) || exit 1
-trap 'rm -rf "$folder"' EXIT
+. tests/support/tap.sh
 
-# check NAME COMMAND...: passes when the command does; shows its output when it does not.
-check() {
-    number=$((number + 1))
-    name=$1
-    shift
-    if "$@" >"$folder/out" 2>&1; then
-        echo "ok $number - $name"
-    else
-        echo "not ok $number - $name"
-        tail -n 20 "$folder/out" | sed 's/^/# /'
-        failed=1
-    fi
-}
-
-skip() {
-    number=$((number + 1))
-    echo "ok $number - $1 # SKIP $2"
-}
-
-have() { command -v "$1" >/dev/null 2>&1; }
 fails() { ! "$@"; }
 
 # As a package would be, and then moved: nothing may depend on where it was configured to go.

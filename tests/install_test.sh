@@ -3,24 +3,7 @@
 # $1: a build folder. SPDX-License-Identifier: MIT
 cd "$(dirname "$0")/.." || exit 1
 build=${1:-build}
-number=0
-failed=0
-folder=$(mktemp -d) || exit 1
-trap 'rm -rf "$folder"' EXIT
-
-# check NAME COMMAND...: passes when the command does; shows its output when it does not.
-check() {
-    number=$((number + 1))
-    name=$1
-    shift
-    if "$@" >"$folder/out" 2>&1; then
-        echo "ok $number - $name"
-    else
-        echo "not ok $number - $name"
-        sed 's/^/# /' "$folder/out"
-        failed=1
-    fi
-}
+. tests/support/tap.sh
 
 # Moves the whole installation: nothing may depend on where it was configured to go.
 install_it() {

@@ -3,23 +3,7 @@
 # $1: a build folder. SPDX-License-Identifier: MIT
 cd "$(dirname "$0")/.." || exit 1
 ascc=${1:-build}/examples/ascc
-number=0
-failed=0
-folder=$(mktemp -d) || exit 1
-trap 'rm -rf "$folder"' EXIT
-
-check() {
-    number=$((number + 1))
-    name=$1
-    shift
-    if "$@" >"$folder/out" 2>&1; then
-        echo "ok $number - $name"
-    else
-        echo "not ok $number - $name"
-        sed 's/^/# /' "$folder/out"
-        failed=1
-    fi
-}
+. tests/support/tap.sh
 
 small() { [ "$(wc -c <"$1")" -le 1048576 ]; }
 card() { [ -f "docs/models/$1.md" ] && grep -q '^## Measured' "docs/models/$1.md"; }

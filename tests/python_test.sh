@@ -4,32 +4,11 @@
 . "$(dirname "$0")/support/python.sh"
 root=$(cd "$(dirname "$0")/.." && pwd) || exit 1
 build=$(cd "${1:-$root/build}" && pwd) || exit 1
-number=0
-failed=0
 if ! python_with 'numpy, setuptools, wheel'; then
     echo '1..0 # SKIP examples/python needs Python 3.9 with numpy, setuptools and wheel'
     exit 0
 fi
-folder=$(mktemp -d) || exit 1
-trap 'rm -rf "$folder"' EXIT
-
-# check NAME COMMAND...: passes when the command does; shows its output when it does not.
-check() {
-    number=$((number + 1))
-    name=$1
-    shift
-    if "$@" >"$folder/out" 2>&1; then
-        echo "ok $number - $name"
-    else
-        echo "not ok $number - $name"
-        sed 's/^/# /' "$folder/out"
-        failed=1
-    fi
-}
-skip() {
-    number=$((number + 1))
-    echo "ok $number - $1 # SKIP $2"
-}
+. "$root/tests/support/tap.sh"
 pip() { "$python" -m pip "$@" --quiet --disable-pip-version-check --no-input; }
 
 # The tree stays clean: setuptools builds beside what it reads.

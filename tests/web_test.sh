@@ -3,31 +3,9 @@
 # $1: a build folder. Installs nothing; what it has no tools for is a SKIP. SPDX-License-Identifier: MIT
 cd "$(dirname "$0")/.." || exit 1
 build=${1:-build}
-number=0
-failed=0
-folder=$(mktemp -d) || exit 1
+. tests/support/tap.sh
 server=
 trap '[ -z "$server" ] || kill $server; rm -rf "$folder"' EXIT
-
-check() {
-    number=$((number + 1))
-    name=$1
-    shift
-    if "$@" >"$folder/out" 2>&1; then
-        echo "ok $number - $name"
-    else
-        echo "not ok $number - $name"
-        tail -n 20 "$folder/out" | sed 's/^/# /'
-        failed=1
-    fi
-}
-
-skip() {
-    number=$((number + 1))
-    echo "ok $number - $1 # SKIP $2"
-}
-
-have() { command -v "$1" >/dev/null 2>&1; }
 
 if ! have emcc || ! have node || ! have python3; then
     skip 'the web page' 'needs emcc, node and python3'
@@ -96,17 +74,17 @@ END
         timeout 120 $browser --headless --no-sandbox --disable-gpu --disable-extensions --disable-background-networking \
             --user-data-dir="$folder/profile" --virtual-time-budget="$2" --dump-dom "$1" 2>/dev/null
     }
-    # Its own time may run out before the module is compiled, on a machine that has much to do: a second try.
-    in_browser() {
+    # told PATTERN ADDRESS: what the page shows of that. Its own time may run out before the module is compiled, on a
+    # machine that has much to do: then it gets more.
+    told() {
         for budget in 20000 100000 500000; do
-            page_after "$page?steps=40" $budget | grep "<title>" | tee "$folder/title"
-            grep -q '<title>hash' "$folder/title" && break
+            page_after "$2" $budget | grep -oE "$1" && return
         done
-        grep "<title>hash $(cat "$folder/hash")</title>" "$folder/title"
     }
+    in_browser() { told '<title>hash [^<]*' "$page?steps=40" | tee "$folder/title"; [ "$(cat "$folder/title")" = "<title>hash $(cat "$folder/hash")" ]; }
     check 'the page gives the same hash in a browser' in_browser
     # Its frames go on by themselves.
-    advances() { page_after "$page" 5000 | grep -oE 'frame [0-9]+, ' | awk '{ print; fine = $2 > 10 } END { exit !fine }'; }
+    advances() { told 'frame [0-9]+, ' "$page" | awk '{ print; fine = $2 > 10 } END { exit !fine }'; }
     check 'the page runs: frames advance' advances
 fi
 echo "1..$number"
