@@ -489,7 +489,7 @@ static void set_wrongly(sequence *s)
         break;
     case 3:
         kind = ASCC_BOUNDARY;
-        field = once_in(s, 2) ? ASCC_VELOCITY : ASCC_MASS;
+        field = ASCC_MASS;
         n = 0;
         break;
     case 4:

@@ -220,15 +220,18 @@ typedef struct ascc_particles ascc_particles;
 /** Which particles a call means. Rows of each kind are numbered from 0, in order of addition. */
 typedef enum ascc_kind {
     ASCC_FLUID = 0,
-    ASCC_BOUNDARY = 1, /* solid walls: fixed points with a unit normal into the fluid, and a body */
+    ASCC_BOUNDARY =
+        1, /* solid walls: points with a unit normal into the fluid, a velocity and a body */
 } ascc_kind;
 
 /** A property of a particle that can be set and read. `dimension` numbers each, or one. */
 typedef enum ascc_field {
     ASCC_POSITION = 0, /* both kinds; length unit */
-    ASCC_VELOCITY = 1, /* fluid; length unit / s. Held as momentum: see ascc_particles_options */
-    ASCC_MASS = 2,     /* fluid; kg, one number. Setting it keeps the velocity */
-    ASCC_NORMAL = 3,   /* boundary; points into the fluid, length 1 */
+    /* Both kinds; length unit / s. Of fluid held as momentum: see ascc_particles_options. Of boundary what the
+     * host last set, at first 0: during a step of dt the point moves by dt times it. */
+    ASCC_VELOCITY = 1,
+    ASCC_MASS = 2,   /* fluid; kg, one number. Setting it keeps the velocity */
+    ASCC_NORMAL = 3, /* boundary; points into the fluid, length 1 */
 } ascc_field;
 
 typedef enum ascc_scalar { ASCC_FLOAT = 0, ASCC_DOUBLE = 1 } ascc_scalar;
@@ -427,7 +430,7 @@ ASCC_API ascc_status ascc_particles_restore(ascc_particles *particles, const voi
                                             size_t size);
 
 /**
- * A hash of all positions, momenta, masses, normals and bodies. It does not depend on the order of
+ * A hash of all positions, momenta, masses, normals, velocities of walls and bodies. It does not depend on the order of
  * rows or on ids: equal scenes added in another order have equal hashes. cost: O(particles).
  */
 ASCC_API uint64_t ascc_particles_hash(const ascc_particles *particles);
@@ -512,7 +515,9 @@ typedef struct ascc_forces {
 } ascc_forces;
 
 /**
- * Advances the fluid by `count` time steps (docs/method.md). Walls do not move.
+ * Advances the fluid by `count` time steps (docs/method.md). Walls go on with their own velocities, which
+ * are taken to be constant all the while: a position of a wall is that at the beginning of a step. Normals
+ * stay as they are; what turns or speeds up is set anew before each step, `count` 1.
  *
  * forces    NULL = the model's gravity alone.
  * errors    ARGUMENT, MISMATCH (dimension; a spacing that is not the model's), MEMORY (scratch had to

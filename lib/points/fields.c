@@ -70,6 +70,20 @@ static ascc_status check_normal(const ascc_candidate *row, ascc_message *message
                      row->row, sqrt(square));
 }
 
+static ascc_status check_velocity(const ascc_candidate *row, ascc_message *message)
+{
+    const double *const velocity = row->values;
+    for (int32_t c = 0; c < row->numbers; c++) {
+        if (!isfinite(velocity[c]))
+            return ascc_fail_number(message, ASCC_ERROR_NOT_FINITE, row->name, row->row, c,
+                                    velocity[c], "");
+        if (fabs(velocity[c]) > ASCC_POSITION_LIMIT * row->spacing)
+            return ascc_fail_number(message, ASCC_ERROR_RANGE, row->name, row->row, c, velocity[c],
+                                    ", beyond 2^40 spacings a second");
+    }
+    return ASCC_OK;
+}
+
 static ascc_status check_body(const ascc_candidate *row, ascc_message *message)
 {
     const int32_t *const body = row->values;
@@ -83,8 +97,9 @@ static ascc_status check_body(const ascc_candidate *row, ascc_message *message)
 
 #define VECTOR true
 #define SCALAR false
-#define HASHED true
-#define UNHASHED false
+#define HASHED ASCC_HASH_ALWAYS
+#define UNHASHED ASCC_HASH_NEVER
+#define NONZERO ASCC_HASH_NONZERO
 #define PRIVATE (-1)
 #define ELEMENT(type)                                                                              \
     _Generic((type)0, double                                                                       \

@@ -12,12 +12,14 @@
  *   member   of struct ascc_particles: a pointer to the first row
  *   type     of a number: double, int64_t, uint64_t or int32_t
  *   numbers  of a row: VECTOR (`dimension`) or SCALAR (one)
- *   hash     HASHED, or UNHASHED: what depends on the order of rows or on the past
+ *   hash     HASHED, or UNHASHED: what depends on the order of rows or on the past; NONZERO: rows of zeros are
+ *            left out, so that hashes taken before there was the field stay what they were
  *   access   what ascc_particles_set and ascc_particles_get call it, or PRIVATE
  *   check    a function of fields.c that says what a row may be, for the host's numbers and for
  *            snapshots; NULL = anything
  *
- * The order is that of memory, snapshot and hash. A line more is a snapshot of another version.
+ * The order is that of memory, snapshot and hash. A line more is a snapshot of another version: put it last, and
+ * say in ascc_snapshot_fields how many fields older versions have.
  */
 #define ASCC_PARTICLE_FIELDS(X)                                                                    \
     X(ASCC_FLUID, position, double, VECTOR, HASHED, ASCC_POSITION, check_position)                 \
@@ -28,10 +30,11 @@
     X(ASCC_BOUNDARY, wall_normal, double, VECTOR, HASHED, ASCC_NORMAL, check_normal)               \
     X(ASCC_BOUNDARY, wall_impulse, int64_t, VECTOR, UNHASHED, PRIVATE, NULL) /* quanta */          \
     X(ASCC_BOUNDARY, wall_id, uint64_t, SCALAR, UNHASHED, PRIVATE, NULL)                           \
-    X(ASCC_BOUNDARY, wall_body, int32_t, SCALAR, HASHED, PRIVATE, check_body)
+    X(ASCC_BOUNDARY, wall_body, int32_t, SCALAR, HASHED, PRIVATE, check_body)                      \
+    X(ASCC_BOUNDARY, wall_velocity, double, VECTOR, NONZERO, ASCC_VELOCITY, check_velocity)
 
 /* Raise it with every change of the list. */
-#define ASCC_SNAPSHOT_VERSION 1
+#define ASCC_SNAPSHOT_VERSION 2
 
 /* Where a field stands in the list: ASCC_FIELD_position and so on. */
 typedef enum ascc_field_index {
@@ -41,8 +44,19 @@ typedef enum ascc_field_index {
         ASCC_FIELD_COUNT
 } ascc_field_index;
 
+/* How many of the list a snapshot of an older version or this one has; 0: no such version. */
+static inline size_t ascc_snapshot_fields(uint64_t version)
+{
+    return version == ASCC_SNAPSHOT_VERSION ? ASCC_FIELD_COUNT
+           : version == 1                   ? ASCC_FIELD_wall_velocity
+                                            : 0;
+}
+
 /* What a number is; all but the last take eight bytes. */
 typedef enum ascc_element { ASCC_REAL, ASCC_INTEGER, ASCC_SMALL_INTEGER } ascc_element;
+
+/* Whether the hash sees a row: never, always, or where it is not zero. */
+typedef enum ascc_hashing { ASCC_HASH_NEVER, ASCC_HASH_ALWAYS, ASCC_HASH_NONZERO } ascc_hashing;
 
 /* A row that is to be stored. */
 typedef struct ascc_candidate {
@@ -59,7 +73,8 @@ typedef struct ascc_particle_field {
     const char *name;
     ascc_kind kind;
     ascc_element element;
-    bool vector, hashed;
+    bool vector;
+    ascc_hashing hash;
     int32_t access; /* an ascc_field, or negative */
     size_t offset;  /* of the pointer in struct ascc_particles */
     ascc_row_check *check;

@@ -11,18 +11,18 @@
  * A row of 64-bit words, little-endian on every machine; floats are their IEEE bits:
  *
  *   magic, version, dimension, fluid count, boundary count, next id, spacing, mass, quantum,
- *   every field of the list in fields.h, row by row,
+ *   every field of the list in fields.h that the version has, row by row,
  *   checksum of all before
  */
 #define SNAPSHOT_MAGIC UINT64_C(0x50414e5343435341) /* the bytes "ASCCSNAP" */
 #define SNAPSHOT_HEADER 9
 #define SNAPSHOT_FRAME (SNAPSHOT_HEADER + 1) /* and the checksum */
 
-/* Words of one particle of a kind. */
-static size_t row_words(ascc_kind kind, int32_t dimension)
+/* Words of one particle of a kind, in a snapshot with the first `fields` of the list. */
+static size_t row_words(ascc_kind kind, int32_t dimension, size_t fields)
 {
     size_t words = 0;
-    for (size_t i = 0; i < ASCC_FIELD_COUNT; i++)
+    for (size_t i = 0; i < fields; i++)
         if (ascc_particle_fields[i].kind == kind)
             words += (size_t)ascc_field_numbers(&ascc_particle_fields[i], dimension);
     return words;
@@ -69,8 +69,10 @@ static uint64_t checksum(const unsigned char *bytes, size_t words)
 
 static size_t snapshot_words(const ascc_particles *particles)
 {
-    return SNAPSHOT_FRAME + particles->fluid_count * row_words(ASCC_FLUID, particles->dimension) +
-           particles->boundary_count * row_words(ASCC_BOUNDARY, particles->dimension);
+    const int32_t dimension = particles->dimension;
+    return SNAPSHOT_FRAME +
+           particles->fluid_count * row_words(ASCC_FLUID, dimension, ASCC_FIELD_COUNT) +
+           particles->boundary_count * row_words(ASCC_BOUNDARY, dimension, ASCC_FIELD_COUNT);
 }
 
 size_t ascc_particles_snapshot_size(const ascc_particles *particles)
@@ -148,6 +150,7 @@ ascc_status ascc_particles_snapshot(const ascc_particles *particles, void *memor
 /* A snapshot taken apart. */
 typedef struct snapshot {
     int32_t dimension;
+    size_t fields; /* of the list */
     size_t rows[ASCC_KIND_COUNT];
     uint64_t next_id;
     double spacing, mass, quantum;
@@ -161,7 +164,8 @@ static bool open_snapshot(const unsigned char *bytes, size_t size, snapshot *fro
     if (size < 8 * SNAPSHOT_FRAME || size % 8 != 0 || get_word(bytes) != SNAPSHOT_MAGIC)
         return false;
     *why = "of a version not known here";
-    if (get_word(bytes + 8) != ASCC_SNAPSHOT_VERSION)
+    const size_t fields = ascc_snapshot_fields(get_word(bytes + 8));
+    if (fields == 0)
         return false;
     *why = "damaged: its checksum is wrong";
     if (get_word(bytes + size - 8) != checksum(bytes, size / 8 - 1))
@@ -173,20 +177,21 @@ static bool open_snapshot(const unsigned char *bytes, size_t size, snapshot *fro
     if (dimension != 2 && dimension != 3)
         return false;
     const size_t words = size / 8 - SNAPSHOT_FRAME;
-    const size_t fluid_words = row_words(ASCC_FLUID, (int32_t)dimension);
-    const size_t boundary_words = row_words(ASCC_BOUNDARY, (int32_t)dimension);
+    const size_t fluid_words = row_words(ASCC_FLUID, (int32_t)dimension, fields);
+    const size_t boundary_words = row_words(ASCC_BOUNDARY, (int32_t)dimension, fields);
     if (fluid > words / fluid_words || boundary > words / boundary_words ||
         (size_t)fluid * fluid_words + (size_t)boundary * boundary_words != words)
         return false;
 
     *from = (snapshot){.dimension = (int32_t)dimension,
+                       .fields = fields,
                        .rows = {(size_t)fluid, (size_t)boundary},
                        .next_id = get_word(bytes + 40),
                        .spacing = double_of(get_word(bytes + 48)),
                        .mass = double_of(get_word(bytes + 56)),
                        .quantum = double_of(get_word(bytes + 64))};
     const unsigned char *at = bytes + 8 * SNAPSHOT_HEADER;
-    for (size_t i = 0; i < ASCC_FIELD_COUNT; i++) {
+    for (size_t i = 0; i < fields; i++) {
         const ascc_particle_field *const field = &ascc_particle_fields[i];
         from->words[i] = at;
         at += 8 * from->rows[field->kind] * (size_t)ascc_field_numbers(field, from->dimension);
@@ -251,7 +256,7 @@ static ascc_status check_snapshot(const snapshot *from, ascc_message *message)
     if (!ascc_is_spacing(from->spacing) || !ascc_is_mass(from->mass) ||
         !ascc_is_quantum(from->quantum))
         return ascc_fail(message, ASCC_ERROR_FORMAT, "an impossible spacing, mass or quantum");
-    for (size_t i = 0; i < ASCC_FIELD_COUNT; i++) {
+    for (size_t i = 0; i < from->fields; i++) {
         const ascc_status status = check_field(from, i, message);
         if (status != ASCC_OK)
             return status;
@@ -270,7 +275,9 @@ static void become(ascc_particles *particles, const snapshot *from)
     particles->next_id = from->next_id;
     particles->fluid_count = from->rows[ASCC_FLUID];
     particles->boundary_count = from->rows[ASCC_BOUNDARY];
-    for (size_t i = 0; i < ASCC_FIELD_COUNT; i++) {
+    for (int kind = 0; kind < ASCC_KIND_COUNT; kind++)
+        ascc_particles_zero_rows(particles, (ascc_kind)kind, 0, from->rows[kind]);
+    for (size_t i = 0; i < from->fields; i++) {
         const ascc_particle_field *const field = &ascc_particle_fields[i];
         unsigned char *const numbers = ascc_field_rows(particles, field);
         const size_t count =
@@ -318,6 +325,22 @@ static uint64_t mix(uint64_t hash, uint64_t word)
     return hash ^ hash >> 31;
 }
 
+/* What a row of a field adds to its particle's hash. */
+static uint64_t mix_row(uint64_t hash, const ascc_particle_field *field, const unsigned char *rows,
+                        size_t row, size_t numbers)
+{
+    uint64_t mixed = hash;
+    bool zero = true;
+    for (size_t k = row * numbers; k < (row + 1) * numbers; k++) {
+        uint64_t word = number_word(field, rows, k);
+        if (field->element == ASCC_REAL)
+            word = bits_of(double_of(word) + 0.0); /* -0 + 0 is 0 */
+        zero &= word == 0;
+        mixed = mix(mixed, word);
+    }
+    return zero && field->hash == ASCC_HASH_NONZERO ? hash : mixed;
+}
+
 /* A sum over particles of what each one's hashed fields mix to, so that their order does not matter. */
 static uint64_t sum_rows(const ascc_particles *particles, ascc_kind kind)
 {
@@ -326,16 +349,9 @@ static uint64_t sum_rows(const ascc_particles *particles, ascc_kind kind)
         uint64_t one = mix(0, kind);
         for (size_t i = 0; i < ASCC_FIELD_COUNT; i++) {
             const ascc_particle_field *const field = &ascc_particle_fields[i];
-            if (field->kind != kind || !field->hashed)
-                continue;
-            const size_t numbers = (size_t)ascc_field_numbers(field, particles->dimension);
-            const unsigned char *const rows = ascc_field_rows(particles, field);
-            for (size_t k = row * numbers; k < (row + 1) * numbers; k++) {
-                const uint64_t word = number_word(field, rows, k);
-                one = mix(one, field->element == ASCC_REAL
-                                   ? bits_of(double_of(word) + 0.0) /* -0 + 0 is 0 */
-                                   : word);
-            }
+            if (field->kind == kind && field->hash != ASCC_HASH_NEVER)
+                one = mix_row(one, field, ascc_field_rows(particles, field), row,
+                              (size_t)ascc_field_numbers(field, particles->dimension));
         }
         sum += one;
     }

@@ -5,7 +5,7 @@
  * or fails as a whole:
  *
  *     fluid     | position | momentum | mass | id |
- *     boundary  | position | normal   | impulse | id | body |
+ *     boundary  | position | normal   | impulse | id | body | velocity |
  */
 #include <string.h>
 

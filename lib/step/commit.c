@@ -89,5 +89,7 @@ ascc_status ascc_stage_commit(ascc_step_state *state, ascc_particles *p, bool fi
     ascc_workers_run(workers, n, 8192, commit_rows, &job);
     if (walls)
         memcpy(p->wall_impulse, state->impulses.wall, walls * d * sizeof(int64_t));
+    if (state->advance.walls_move)
+        memcpy(p->wall_position, state->advance.wall, walls * d * sizeof(double));
     return ASCC_OK;
 }

@@ -27,6 +27,9 @@ typedef struct ascc_advance {
     double *velocity;  /* after external forces: what the network sees */
     int64_t *momentum; /* at the end */
     int64_t *external; /* impulse of gravity and acceleration, quanta */
+    /* Where walls end, [boundary count][dimension]: the particles' own array while none moves. */
+    const double *wall;
+    bool walls_move;
 } ascc_advance;
 
 /* At a free surface, where density lacks more than this, a divergence means nothing. */
@@ -65,6 +68,8 @@ typedef ascc_status (*ascc_stage)(ascc_step_state *state);
 
 /* v* = v + dt g, and where the network sees the particles. errors: MEMORY, RANGE. */
 ascc_status ascc_stage_forces(ascc_step_state *state);
+/* Where walls end, if any moves. errors: MEMORY, RANGE; the message names the row. */
+ascc_status ascc_stage_wall_motion(ascc_step_state *state);
 /* Features, and the point sets of the scene (paper sections 3.3, 3.4). errors: MEMORY, RANGE. */
 ascc_status ascc_stage_sight(ascc_step_state *state);
 /* New momenta and positions. errors: RANGE, NOT_FINITE; the message names the particle. */

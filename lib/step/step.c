@@ -204,9 +204,13 @@ static const struct {
     const char *name; /* NULL: it names its own */
     ascc_stage run;
 } stages[] = {
-    {"forces", ascc_stage_forces},   {NULL, run_engine},
-    {"advance", ascc_stage_advance}, {NULL, ascc_stage_relaxation},
-    {"contact", ascc_stage_contact}, {NULL, ascc_stage_divergence},
+    {"forces", ascc_stage_wall_motion},
+    {"forces", ascc_stage_forces},
+    {NULL, run_engine},
+    {"advance", ascc_stage_advance},
+    {NULL, ascc_stage_relaxation},
+    {"contact", ascc_stage_contact},
+    {NULL, ascc_stage_divergence},
 };
 
 ascc_status ascc_step_once(ascc_step *step, ascc_particles *p, const ascc_motion *motion,
@@ -297,33 +301,46 @@ static ascc_status check_particles(ascc_step *step, const ascc_particles *p)
     return ASCC_OK;
 }
 
-/* Positions, momenta and impulses of walls, kept until all substeps have succeeded. */
+/* What a step changes, each in the step's own memory until all substeps have succeeded. */
+typedef struct kept_field {
+    void *rows;
+    size_t size;
+} kept_field;
+
+#define KEPT_FIELDS 4
+
+static size_t find_kept(const ascc_particles *p, kept_field field[KEPT_FIELDS])
+{
+    const size_t d = (size_t)p->dimension;
+    const size_t n = p->fluid_count * d * 8, w = p->boundary_count * d * 8;
+    field[0] = (kept_field){p->position, n};
+    field[1] = (kept_field){p->momentum, n};
+    field[2] = (kept_field){p->wall_impulse, w};
+    field[3] = (kept_field){p->wall_position, w};
+    return 2 * n + 2 * w;
+}
+
 static bool keep(ascc_step *step, const ascc_particles *p)
 {
-    const size_t n = p->fluid_count * (size_t)p->dimension * 8;
-    const size_t w = p->boundary_count * (size_t)p->dimension * 8;
-    if (!ascc_grow(&step->context->allocator, (void **)&step->kept, &step->kept_capacity, 2 * n + w,
-                   1))
+    kept_field field[KEPT_FIELDS];
+    if (!ascc_grow(&step->context->allocator, (void **)&step->kept, &step->kept_capacity,
+                   find_kept(p, field), 1))
         return false;
-    if (n) {
-        memcpy(step->kept, p->position, n);
-        memcpy(step->kept + n, p->momentum, n);
-    }
-    if (w)
-        memcpy(step->kept + 2 * n, p->wall_impulse, w);
+    unsigned char *at = step->kept;
+    for (int i = 0; i < KEPT_FIELDS; at += field[i++].size)
+        if (field[i].size)
+            memcpy(at, field[i].rows, field[i].size);
     return true;
 }
 
 static void take_back(const ascc_step *step, ascc_particles *p)
 {
-    const size_t n = p->fluid_count * (size_t)p->dimension * 8;
-    const size_t w = p->boundary_count * (size_t)p->dimension * 8;
-    if (n) {
-        memcpy(p->position, step->kept, n);
-        memcpy(p->momentum, step->kept + n, n);
-    }
-    if (w)
-        memcpy(p->wall_impulse, step->kept + 2 * n, w);
+    kept_field field[KEPT_FIELDS];
+    (void)find_kept(p, field);
+    const unsigned char *at = step->kept;
+    for (int i = 0; i < KEPT_FIELDS; at += field[i++].size)
+        if (field[i].size)
+            memcpy(field[i].rows, at, field[i].size);
 }
 
 /* One time step of the host's: all of its substeps, or none. */

@@ -47,14 +47,14 @@ static unsigned char *complete(const uint8_t *data, size_t size, size_t *made)
     const size_t d = 2 + (fuzz_take(&in, 1) & 1);
     const uint64_t share = fuzz_take(&in, 1);
     const size_t head = 4, given = in.left / 8, body = given > head ? given - head : 0;
-    const size_t fluid_words = 2 * d + 2, wall_words = 3 * d + 2;
+    const size_t fluid_words = 2 * d + 2, wall_words = 4 * d + 2;
     const size_t walls = body * (size_t)share / 256 / wall_words;
     const size_t fluid = (body - walls * wall_words) / fluid_words;
     const size_t words = HEADER + fluid * fluid_words + walls * wall_words + 1;
     unsigned char *bytes = calloc(words, 8);
     fuzz_require(bytes != NULL);
     put(bytes, 0, UINT64_C(0x50414e5343435341));
-    put(bytes, 1, 1);
+    put(bytes, 1, 2);
     put(bytes, 2, d);
     put(bytes, 3, fluid);
     put(bytes, 4, walls);

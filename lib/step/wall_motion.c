@@ -1,0 +1,77 @@
+/* Where walls end: each point goes on with its own velocity. SPDX-License-Identifier: MIT */
+#include <math.h>
+
+#include "stage.h"
+
+typedef struct motion_job {
+    const ascc_particles *p;
+    const ascc_motion *motion;
+    double *to;        /* NULL: only look whether any moves */
+    atomic_bool moves; /* one of them */
+    atomic_size_t bad; /* 1 + first row that fails */
+} motion_job;
+
+static void look_at_rows(void *data, size_t begin, size_t end, int32_t slot)
+{
+    (void)slot;
+    motion_job *job = data;
+    const size_t d = (size_t)job->p->dimension;
+    bool moves = false;
+    for (size_t k = begin * d; k < end * d && !moves; k++)
+        moves = job->p->wall_velocity[k] != 0.0;
+    if (moves)
+        atomic_store_explicit(&job->moves, true, memory_order_relaxed);
+}
+
+static ascc_status move_row(const motion_job *job, size_t i, ascc_message *message)
+{
+    const ascc_particles *p = job->p;
+    const size_t d = (size_t)p->dimension;
+    const double most = job->motion->max_displacement;
+    double moved = 0.0;
+    for (size_t c = 0; c < d; c++) {
+        const size_t k = i * d + c;
+        const double way = job->motion->time_step * p->wall_velocity[k];
+        job->to[k] = p->wall_position[k] + way;
+        moved += way * way;
+        if (!(fabs(job->to[k]) <= ASCC_POSITION_LIMIT * p->spacing))
+            return ascc_fail(message, ASCC_ERROR_RANGE,
+                             "boundary row %zu: its velocity takes it out of range", i);
+    }
+    if (most > 0.0 && moved > most * most)
+        return ascc_fail(message, ASCC_ERROR_RANGE,
+                         "boundary row %zu would move %g, more than max_displacement = %g", i,
+                         sqrt(moved), most);
+    return ASCC_OK;
+}
+
+static void move_rows(void *data, size_t begin, size_t end, int32_t slot)
+{
+    (void)slot;
+    motion_job *job = data;
+    ascc_message message;
+    for (size_t i = begin; i < end; i++)
+        if (move_row(job, i, &message) != ASCC_OK) {
+            ascc_note_first(&job->bad, i);
+            return;
+        }
+}
+
+ascc_status ascc_stage_wall_motion(ascc_step_state *state)
+{
+    const ascc_particles *p = state->particles;
+    const size_t count = p->boundary_count;
+    motion_job job = {.p = p, .motion = state->motion};
+    ascc_workers_run(state->tools.workers, count, 8192, look_at_rows, &job);
+    state->advance.wall = p->wall_position;
+    state->advance.walls_move = atomic_load(&job.moves);
+    if (!state->advance.walls_move)
+        return ASCC_OK;
+    job.to = ascc_arena_take(state->tools.arena, count * (size_t)p->dimension, sizeof *job.to);
+    if (!job.to)
+        return ascc_fail(state->tools.message, ASCC_ERROR_MEMORY, "no memory for %zu walls", count);
+    ascc_workers_run(state->tools.workers, count, 4096, move_rows, &job);
+    state->advance.wall = job.to;
+    const size_t bad = atomic_load(&job.bad); /* says once more why */
+    return bad ? move_row(&job, bad - 1, state->tools.message) : ASCC_OK;
+}
