@@ -1,5 +1,6 @@
 #!/bin/sh
-# examples/python: the wheel, its types, the package against the library of a build; prints TAP.
+# examples/python: the wheel, its types, the package against the library of a build, and with it a network against
+# numpy; prints TAP.
 # $1: a build folder. SPDX-License-Identifier: MIT
 . "$(dirname "$0")/support/python.sh"
 root=$(cd "$(dirname "$0")/.." && pwd) || exit 1
@@ -67,12 +68,15 @@ page() {
 }
 check 'the code in docs/python.md runs' page python.md
 check 'so does that in docs/walls.md' page walls.md
-# The package's own tests; their numbers follow.
-"$python" "$root/tests/test_python.py" >"$folder/tap" 2>&1 || failed=1
-grep -q '^1\.\.[1-9]' "$folder/tap" || { echo "not ok - tests/test_python.py runs"; sed 's/^/# /' "$folder/tap"; }
+# The package's own tests, and a network through it; their numbers follow.
+for name in test_python test_pointnet; do
+    "$python" "$root/tests/$name.py" >"$folder/$name.tap" 2>&1 || failed=1
+    grep -q '^1\.\.[1-9]' "$folder/$name.tap" ||
+        { echo "not ok - tests/$name.py runs"; sed 's/^/# /' "$folder/$name.tap"; }
+done
 awk -v number="$number" '/^1\.\./ { next }
     /^ok / { sub(/^ok [0-9]+/, "ok " ++number) }
     /^not ok / { sub(/^not ok [0-9]+/, "not ok " ++number) }
     { print }
-    END { print "1.." number }' "$folder/tap"
+    END { print "1.." number }' "$folder/test_python.tap" "$folder/test_pointnet.tap"
 exit $failed

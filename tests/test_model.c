@@ -968,6 +968,86 @@ static void wrong_motions_dampings_and_walls_are_refused_by_name(void **state)
     }
 }
 
+static void wrong_abstractions_and_interpolations_are_refused_by_name(void **state)
+{
+    (void)state;
+    static const char head[] =
+        "{\"name\":\"n\",\"dimension\":2,\"time_step\":0.01,\"gravity\":[0,-9.81],"
+        "\"particle_spacing\":0.05,\"rest_density\":1000,\"evaluate\":\"current\","
+        "\"features\":{\"fluid\":[\"one\",\"velocity\"],\"boundary\":[]},"
+        "\"levels\":[{\"ratio\":0.5}],\"sampling\":{\"method\":\"farthest\"},"
+        "\"layers\":[{\"name\":\"a\",\"points\":\"level1\",\"channels\":2,\"terms\":["
+        "{\"type\":\"set_abstraction\",\"source\":\"fluid\",\"radius\":0.1,\"pool\":\"maximum\","
+        "\"hidden\":4,\"hidden_weight\":\"h\",\"hidden_bias\":\"hb\",\"weight\":\"w\",\"bias\":"
+        "\"b\","
+        "\"neighbor_limit\":9}]},"
+        "{\"name\":\"c\",\"points\":\"fluid\",\"channels\":2,\"terms\":["
+        "{\"type\":\"interpolation\",\"source\":\"a\",\"nearest\":3,\"radius\":0.2,"
+        "\"weight\":\"u\"}]}],"
+        "\"output\":{\"type\":\"plain\",\"source\":\"c\",\"scale\":0.01}}";
+    static const struct {
+        const char *from, *to, *hint;
+    } cases[] = {
+        {"\"radius\":0.1", "\"radius\":0", "'radius'"},
+        {"\"radius\":0.1,", "", "'radius'"},
+        {"\"pool\":\"maximum\"", "\"pool\":\"sum\"", "'pool'"},
+        {"\"pool\":\"maximum\",", "", "'pool'"},
+        {"\"hidden\":4", "\"hidden\":0", "'hidden'"},
+        {"\"hidden\":4", "\"hidden\":1025", "'hidden'"},
+        {"\"hidden\":4,", "", "'hidden'"},
+        {"\"hidden\":4", "\"hidden\":5", "'w' has the shape [4, 2], but must have [5, 2]: hidden"},
+        {"\"hidden_weight\":\"h\",", "", "'hidden_weight'"},
+        {"\"hidden_bias\":\"hb\",", "", "'hidden_bias'"},
+        {"\"hidden_bias\":\"hb\"", "\"hidden_bias\":\"b\"",
+         "'b' has the shape [2], but must have [4]"},
+        {"\"weight\":\"w\",", "", "'weight'"},
+        {"\"bias\":\"b\",", "", "'bias'"},
+        {"\"bias\":\"b\"", "\"bias\":\"gone\"", "'gone' is missing"},
+        {"\"one\",\"velocity\"", "\"velocity\"",
+         "'h' has the shape [5, 4], but must have [4, 4]: inputs + dimension"},
+        {"\"neighbor_limit\":9", "\"neighbor_limit\":-1", "limit"},
+        {"\"neighbor_limit\":9", "\"relative\":true", "'relative'"},
+        {"\"points\":\"level1\",\"channels\":2,\"terms\":[{\"type\":\"set_abstraction\"",
+         "\"points\":\"fluid\",\"channels\":2,\"terms\":[{\"type\":\"set_abstraction\","
+         "\"relative\":true",
+         "no 'neighbor_limit'"},
+        {"\"neighbor_limit\":9", "\"skip_self\":true", "'skip_self'"},
+        {"\"nearest\":3", "\"nearest\":0", "'nearest'"},
+        {"\"nearest\":3", "\"nearest\":65", "'nearest'"},
+        {"\"nearest\":3,", "", "'nearest'"},
+        {"\"radius\":0.2", "\"radius\":-1", "'radius'"},
+        {"\"weight\":\"u\"", "\"weight\":\"w\"", "[4, 2], but must have [2, 2]"},
+        {"\"weight\":\"u\"", "\"normalize\":true", "'normalize'"},
+        {",\"weight\":\"u\"", "", "'u' is not used"},
+        {"\"name\":\"c\",\"points\":\"fluid\"", "\"name\":\"c\",\"points\":\"level1\"",
+         "from one point set to another"},
+        {"\"name\":\"n\"", "\"name\":\"m\"", NULL},
+    };
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        size_t size;
+        char *network = replaced(head, cases[i].from, cases[i].to);
+        model_builder builder;
+        model_builder_open(&builder);
+        model_builder_metadata(&builder, "format", "ascc.model");
+        model_builder_metadata(&builder, "version", "1");
+        model_builder_metadata(&builder, "network", network);
+        add_tensor(&builder, "h", 2, (const size_t[]){5, 4}, 0);
+        add_tensor(&builder, "hb", 1, (const size_t[]){4}, 0);
+        add_tensor(&builder, "w", 2, (const size_t[]){4, 2}, 0);
+        add_tensor(&builder, "b", 1, (const size_t[]){2}, 0);
+        add_tensor(&builder, "u", 2, (const size_t[]){2, 2}, 0);
+        unsigned char *bytes = model_builder_finish(&builder, &size);
+        free(network);
+        if (cases[i].hint) {
+            must_refuse(cases[i].to, bytes, size, cases[i].hint);
+            continue;
+        }
+        ascc_model *model = must_load(bytes, size); /* the last: it was right */
+        assert_int_equal(model->plan.parameter_count, 20 + 4 + 8 + 2 + 4);
+        ascc_model_destroy(&model);
+    }
+}
+
 static void layers_without_terms_are_refused(void **state)
 {
     (void)state;
@@ -1146,7 +1226,7 @@ static void weights_of_other_types_are_refused_by_name(void **state)
 static void descriptions_that_the_fuzzer_starts_from_load(void **state)
 {
     (void)state;
-    for (const char *kind = "nb"; *kind != '\0'; kind++) {
+    for (const char *kind = "nbp"; *kind != '\0'; kind++) {
         size_t size;
         char *description = model_builder_description(*kind);
         unsigned char *bytes = model_builder_described(*kind, description, &size);
@@ -1198,6 +1278,9 @@ static void every_failing_allocation_is_reported(void **state)
     fail_every_allocation(bytes, size);
     bytes = model_builder_random(&(model_random){.levels = 2, .bumps = 2, .transfer = 1}, &size);
     fail_every_allocation(bytes, size);
+    bytes = model_builder_random(
+        &(model_random){.levels = 2, .abstraction = 1, .method = "farthest", .plain = 1}, &size);
+    fail_every_allocation(bytes, size);
 }
 
 int main(void)
@@ -1217,6 +1300,7 @@ int main(void)
         cmocka_unit_test(wrong_descriptions_are_refused_by_name),
         cmocka_unit_test(wrong_bases_and_transfers_are_refused_by_name),
         cmocka_unit_test(wrong_motions_dampings_and_walls_are_refused_by_name),
+        cmocka_unit_test(wrong_abstractions_and_interpolations_are_refused_by_name),
         cmocka_unit_test(layers_without_terms_are_refused),
         cmocka_unit_test(wrong_tensors_are_refused_by_name),
         cmocka_unit_test(kernels_have_a_bounded_number_of_cells),

@@ -123,6 +123,19 @@ static void stencil(int v, model_random *r)
     r->evaluate = evaluations[v / 3 % 2];
 }
 
+static void hourglass(int v, model_random *r)
+{
+    r->abstraction = 1 + 2 * (v / 2 % 64);
+    r->levels = 2;
+    r->method = "farthest";
+    r->fluid_only = v / 3 % 2;
+    r->trunk_layers = 1;
+    r->plain = v / 5 % 2;
+    r->bumps = 2;
+    r->order = 1;
+    r->evaluate = evaluations[v / 7 % 2];
+}
+
 static void rows(int v, model_random *r)
 {
     r->plain = 1;
@@ -197,6 +210,8 @@ static const recipe recipes[] = {
     {"convolution in a basis", 6, 300, basis_levels, NULL},
     {"pair moments", 24, 400, moments, NULL},
     {"stencil", 16, 1200, stencil, NULL},
+    {"set abstraction", 32, 1300, hourglass, NULL},
+    {"interpolation", 0, 0, NULL, NULL}, /* likewise */
     {"dense", 4, 500, rows, NULL},
     {"identity", 4, 600, rows, NULL},
     {"transfer", 16, 700, transfer, NULL},

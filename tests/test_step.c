@@ -21,10 +21,10 @@ typedef struct world_options {
     int32_t dimension, threads, neighbor_limit;
     uint32_t cpu_disable;
     bool radial, walls, unequal, random_network;
-    bool gravity;               /* the random network sees it */
-    const char *method;         /* of sampling; NULL = voxel centres */
-    int bumps, order, transfer; /* of the random network: see model_random */
-    const char *type;           /* of its weights, all of which every type holds */
+    bool gravity;                            /* the random network sees it */
+    const char *method;                      /* of sampling; NULL = voxel centres */
+    int bumps, order, transfer, abstraction; /* of the random network: see model_random */
+    const char *type;                        /* of its weights, all of which every type holds */
     uint32_t shuffle;
     double far;  /* one more particle this far away; 0 = none */
     double unit; /* metres in the host's length; 0 = 1 */
@@ -50,6 +50,7 @@ static ascc_model *make_model(ascc_context *context, const world_options *o)
                                 .bumps = o->bumps,
                                 .order = o->order,
                                 .transfer = o->transfer,
+                                .abstraction = o->abstraction,
                                 .method = o->method     ? o->method
                                           : o->transfer ? "voxel_corners"
                                                         : "voxel_centers",
@@ -418,20 +419,26 @@ static void bits_do_not_depend_on_threads_cpu_or_order(void **state)
 static void every_way_of_sampling_steps_with_the_same_bits(void **state)
 {
     (void)state;
-    static const char *const methods[] = {"voxel_centers", "voxel_corners", "farthest"};
-    uint64_t seen[3];
-    for (int m = 0; m < 3; m++) {
+    static const char *const methods[] = {"voxel_centers", "voxel_corners", "farthest", "farthest",
+                                          "farthest"};
+    static const int abstractions[] = {0, 0, 0, 1 + 2 + 16, 1 + 4 + 8 + 32};
+    uint64_t seen[5];
+    for (int m = 0; m < 5; m++) {
         world_options o = {.dimension = 3,
                            .threads = 1,
                            .random_network = true,
                            .walls = true,
-                           .method = methods[m]};
+                           .method = methods[m],
+                           .abstraction = abstractions[m]};
         seen[m] = hash_after(&o, 5);
+        for (int other = 0; other < m; other++)
+            assert_true(seen[m] != seen[other]);
         o.threads = 3;
         o.shuffle = 7;
         assert_true(hash_after(&o, 5) == seen[m]);
+        o.cpu_disable = ASCC_CPU_AVX2 | ASCC_CPU_AVX512 | ASCC_CPU_NEON | ASCC_CPU_SIMD128;
+        assert_true(hash_after(&o, 5) == seen[m]);
     }
-    assert_true(seen[0] != seen[1] && seen[1] != seen[2] && seen[0] != seen[2]);
 }
 
 static void short_weights_give_the_bits_of_the_floats_they_stand_for(void **state)

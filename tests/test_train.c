@@ -362,6 +362,26 @@ static void gradients_with_positions_as_constants_are_right(void **state)
     print_message("# constant positions: %.2g\n", worst);
 }
 
+static void gradients_of_rollouts_through_set_abstractions_are_right(void **state)
+{
+    (void)state;
+    double worst = 0.0;
+    for (int v = 0; v < 4; v++) {
+        gradient_case c = {.name = "set abstractions",
+                           .random = small_basis(1900 + (uint64_t)v, 2 + v % 2),
+                           .unroll = 2,
+                           .constant_positions = v / 2,
+                           .samples = 24};
+        c.random.abstraction = v % 3 ? 1 + 2 + 16 : 1 + 4 + 8 + 32;
+        c.random.levels = 2;
+        c.random.method = "farthest";
+        c.random.fluid_only = v / 2;
+        c.random.plain = 1;
+        worst = fmax(worst, check_gradient(&c));
+    }
+    print_message("# set abstractions: %.2g\n", worst);
+}
+
 static void gradients_of_penalties_are_right(void **state)
 {
     (void)state;
@@ -952,6 +972,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(gradients_of_rollouts_are_right),
         cmocka_unit_test(gradients_with_positions_as_constants_are_right),
+        cmocka_unit_test(gradients_of_rollouts_through_set_abstractions_are_right),
         cmocka_unit_test(gradients_of_penalties_are_right),
         cmocka_unit_test(gradients_through_the_relaxation_are_right),
         cmocka_unit_test(same_seed_gives_the_same_weights_for_any_threads),

@@ -8,6 +8,7 @@
  *   'h'  a header; what follows a byte 0xff is the data
  *   'n'  the network of a file of libascc's own, whose tensors are right for the corpus
  *   'b'  the same of one in a basis, with transfers and BF16 tensors
+ *   'p'  the same of one with set abstractions on farthest points
  *   'd'  the architecture of a published DMCF network, likewise
  *   'c'  that of a published CConv network
  */
@@ -17,6 +18,7 @@
 #include "fuzz.h"
 #include "fuzz_model.h"
 #include "model/model.h"
+#include "model/operation.h"
 #include "published.h"
 #include "support/model_builder.h"
 
@@ -28,6 +30,23 @@ static void read_all(const float *values, size_t count)
 {
     for (size_t i = 0; i < count; i++)
         sum += values[i];
+}
+
+/* All numbers of a term's tensors, of the shapes that its operation wants. */
+static void read_tensors(const ascc_plan *plan, const ascc_term *term)
+{
+    static const size_t nothing[ASCC_SAFETENSORS_MAX_RANK];
+    ascc_tensor_wanted wanted[ASCC_MAX_TENSORS] = {{0}};
+    ascc_term copy = *term;
+    if (term->operation->tensors)
+        term->operation->tensors(plan, &copy, nothing, wanted);
+    for (int i = 0; i < ASCC_MAX_TENSORS; i++) {
+        size_t count = 1;
+        for (int32_t k = 0; k < wanted[i].rank; k++)
+            count *= wanted[i].shape[k];
+        if (term->tensor[i])
+            read_all(term->tensor[i], count);
+    }
 }
 
 static size_t cell_count(const ascc_filter *filter)
@@ -43,13 +62,9 @@ static void check_plan(const ascc_plan *plan)
         fuzz_require(layer->term_count > 0 && layer->channels > 0);
         for (int32_t t = layer->first_term; t < layer->first_term + layer->term_count; t++) {
             const ascc_term *term = &plan->term[t];
-            const size_t pairs = (size_t)term->inputs * (size_t)term->outputs;
             fuzz_require(term->source >= 0 && term->source <= i + 1);
             fuzz_require(term->column >= 0 && term->column + term->outputs <= layer->channels);
-            if (term->tensor[ASCC_TENSOR_WEIGHT])
-                read_all(term->tensor[ASCC_TENSOR_WEIGHT], cell_count(&term->filter) * pairs);
-            if (term->tensor[ASCC_TENSOR_BIAS])
-                read_all(term->tensor[ASCC_TENSOR_BIAS], (size_t)term->outputs);
+            read_tensors(plan, term);
         }
     }
     const ascc_output *output = &plan->output;
@@ -133,6 +148,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
         break;
     case 'n':
     case 'b':
+    case 'p':
     case 'd':
     case 'c':
         load_text(data + 1, size - 1, (char)data[0]);

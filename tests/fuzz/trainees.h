@@ -4,7 +4,7 @@
 
 #include "support/model_builder.h"
 
-/* By number: pairs by grid and by basis, two levels, walls that act. */
+/* By number: pairs by grid and by basis, two levels, walls that act; a plain output, set abstractions. */
 static const model_random trainees[] = {
     {.seed = 1, .channels = 4, .trunk_layers = 1, .cells = 2, .output_cells = 2},
     {.seed = 2,
@@ -27,6 +27,14 @@ static const model_random trainees[] = {
      .limit = 0.5,
      .contact = 0.4},
     {.seed = 4, .channels = 4, .trunk_layers = 1, .cells = 2, .output_cells = 2, .plain = 1},
+    {.seed = 5,
+     .channels = 4,
+     .trunk_layers = 1,
+     .bumps = 2,
+     .levels = 2,
+     .method = "farthest",
+     .abstraction = 1 + 2 + 32,
+     .plain = 1},
 };
 enum { TRAINEES = sizeof trainees / sizeof *trainees };
 

@@ -410,6 +410,64 @@ static void add_moments(random_network *n)
     model_text_add(&n->text, "]}");
 }
 
+/* A set abstraction of 8 hidden channels; options begin with a comma, or are none. */
+static void add_abstraction(random_network *n, const char *name, const char *source, double radius,
+                            const char *options, int mean, int in, int out)
+{
+    const size_t d = (size_t)n->o.dimension, hidden[2] = {(size_t)in + d, 8};
+    const size_t last[2] = {8, (size_t)out};
+    char text[64];
+    model_text_add(
+        &n->text,
+        "%s{\"type\":\"set_abstraction\",\"source\":\"%s\",\"radius\":%s,\"hidden\":8,"
+        "\"pool\":\"%s\",\"hidden_weight\":\"%s.hidden\",\"hidden_bias\":\"%s.hidden_bias\","
+        "\"weight\":\"%s.weight\",\"bias\":\"%s.bias\"%s}",
+        n->terms++ ? "," : "", source, model_number(radius * n->o.spacing),
+        mean ? "mean" : "maximum", name, name, name, name, options);
+    snprintf(text, sizeof text, "%s.hidden", name);
+    add_random(&n->builder, &n->state, text, 2, hidden, n->o.gain / sqrt((double)in));
+    snprintf(text, sizeof text, "%s.hidden_bias", name);
+    add_random(&n->builder, &n->state, text, 1, hidden + 1, 0.1 * n->o.gain);
+    snprintf(text, sizeof text, "%s.weight", name);
+    add_random(&n->builder, &n->state, text, 2, last, n->o.gain / sqrt(8.0));
+    snprintf(text, sizeof text, "%s.bias", name);
+    add_random(&n->builder, &n->state, text, 1, last + 1, 0.1 * n->o.gain);
+}
+
+/* Particles, farthest points among them, and back: an hourglass of set abstractions. */
+static void add_hourglass(random_network *n)
+{
+    const int d = n->o.dimension, in = 2 + 2 * d, bits = n->o.abstraction;
+    const char *points = n->o.fluid_only ? "fluid" : "all", *matrix = bits & 32 ? "up" : NULL;
+    model_text_add(&n->text,
+                   "{\"name\":\"joined\",\"points\":\"all\",\"channels\":%d,\"terms\":["
+                   "{\"type\":\"identity\",\"source\":\"fluid\"},"
+                   "{\"type\":\"identity\",\"source\":\"boundary\",\"column\":%d}]},"
+                   "{\"name\":\"s1\",\"points\":\"%s\",\"channels\":6,\"terms\":[",
+                   in, 1 + d, points);
+    n->terms = 0;
+    add_abstraction(n, "s1", "joined", n->o.radius, bits & 2 ? ",\"relative\":true" : "", bits & 4,
+                    in, 6);
+    model_text_add(&n->text,
+                   "]},{\"name\":\"s2\",\"points\":\"level1\",\"channels\":%d,\"terms\":[",
+                   n->o.channels);
+    n->terms = 0;
+    add_abstraction(n, "s2", "s1", 2.0 * n->o.radius, bits & 16 ? ",\"neighbor_limit\":8" : "",
+                    bits & 8, 6, n->o.channels);
+    model_text_add(&n->text,
+                   "]},{\"name\":\"l0.0\",\"points\":\"%s\",\"channels\":%d,\"terms\":["
+                   "{\"type\":\"interpolation\",\"source\":\"s2\",\"nearest\":3,\"radius\":%s",
+                   points, n->o.channels, model_number(3.0 * n->o.radius * n->o.spacing));
+    if (matrix) {
+        model_text_add(&n->text, ",\"weight\":\"up.kernel\",\"bias\":\"up.bias\"");
+        add_weights(&n->builder, &n->state, matrix, d, 0, n->o.channels, n->o.channels, n->o.gain);
+    }
+    model_text_add(&n->text, "}");
+    n->terms = 1;
+    add_dense(n, "skip", "s1", 0, 0, 6, n->o.channels);
+    model_text_add(&n->text, "]}");
+}
+
 static void add_first_layer(random_network *n)
 {
     const int d = n->o.dimension, quarter = n->o.channels / 4;
@@ -430,7 +488,8 @@ static void add_first_layer(random_network *n)
 static void add_trunk_layer(random_network *n, int layer)
 {
     const int last = layer == n->o.trunk_layers, c = n->o.channels;
-    const int levels = n->o.lattice ? 1 : n->o.levels, sources = layer == 1 ? 1 : levels;
+    const int levels = n->o.lattice || n->o.abstraction ? 1 : n->o.levels;
+    const int sources = layer == 1 ? 1 : levels;
     for (int d = 0; d < (last ? 1 : levels); d++) {
         char points[16], name[48], source[48];
         snprintf(points, sizeof points, d ? "level%d" : n->o.fluid_only ? "fluid" : "all", d);
@@ -489,7 +548,7 @@ static void add_head(random_network *n)
             &n->text, "%s{\"%s\":%s}", i > 1 ? "," : "", farthest ? "ratio" : "voxel",
             model_number(farthest ? 1.0 / (double)(1 << i) : o->spacing * (double)(1 << i)));
     model_text_add(&n->text, "],\"sampling\":{\"method\":\"%s\"%s", o->method,
-                   o->lattice ? ",\"points\":\"fluid\"" : "");
+                   o->lattice || o->abstraction & 64 ? ",\"points\":\"fluid\"" : "");
     if (!farthest)
         model_text_add(&n->text, ",\"anchor\":\"%s\"", o->anchor);
     if (strcmp(o->method, "voxel_corners") == 0)
@@ -580,6 +639,8 @@ static unsigned char *random_file(const model_random *options, const char *netwo
     model_text_add(&n.text, ",\"layers\":[");
     if (o->moments)
         add_moments(&n);
+    else if (o->abstraction)
+        add_hourglass(&n);
     else
         add_first_layer(&n);
     for (int layer = 1; layer <= o->trunk_layers; layer++)
@@ -803,12 +864,24 @@ static const model_random small = {
     .levels = 2, .channels = 4, .cells = 2, .output_cells = 2, .neighbor_limit = 8};
 static const model_random small_basis = {
     .levels = 2, .channels = 4, .bumps = 2, .order = 1, .transfer = 1, .type = "BF16"};
+static const model_random small_hourglass = {.levels = 2,
+                                             .channels = 4,
+                                             .cells = 2,
+                                             .trunk_layers = 1,
+                                             .method = "farthest",
+                                             .abstraction = 1 + 2 + 16 + 32,
+                                             .plain = 1};
+
+static const model_random *small_of(char kind)
+{
+    return kind == 'b' ? &small_basis : kind == 'p' ? &small_hourglass : &small;
+}
 
 unsigned char *model_builder_described(char kind, const char *text, size_t *size)
 {
     return kind == 'd'   ? model_builder_dmcf(dmcf_architecture, text, size)
            : kind == 'c' ? model_builder_cconv(cconv_architecture, text, size)
-                         : random_file(kind == 'b' ? &small_basis : &small, text, NULL, size);
+                         : random_file(small_of(kind), text, NULL, size);
 }
 
 char *model_builder_description(char kind)
@@ -816,7 +889,7 @@ char *model_builder_description(char kind)
     model_text text = {NULL, 0, 0};
     size_t size;
     if (kind != 'd' && kind != 'c') {
-        free(random_file(kind == 'b' ? &small_basis : &small, NULL, &text.text, &size));
+        free(random_file(small_of(kind), NULL, &text.text, &size));
         return text.text;
     }
     model_text_add(&text, "%s", kind == 'd' ? dmcf_architecture : cconv_architecture);

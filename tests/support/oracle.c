@@ -596,6 +596,103 @@ static void stencil(const network_state *n, const ascc_layer *layer, const ascc_
     free(tap);
 }
 
+/* Source points within the radius of a query in the order of their distance, at most the limit; how many. */
+static size_t nearest_of(const network_state *n, const ascc_term *term, const point *query,
+                         size_t *nearest)
+{
+    const point_set *source = &n->sets->set[n->value[term->source].set];
+    double d[3];
+    size_t count = 0;
+    for (size_t j = 0; j < source->count; j++) {
+        const double length = displacement(&source->point[j], query, d);
+        if (length > term->filter.radius)
+            continue;
+        size_t at = count++;
+        for (; at > 0 && displacement(&source->point[nearest[at - 1]], query, d) > length; at--)
+            nearest[at] = nearest[at - 1];
+        nearest[at] = j;
+    }
+    const size_t limit = (size_t)term->filter.neighbor_limit;
+    return limit && count > limit ? limit : count;
+}
+
+static bool shared_row(const network_state *n, int32_t source, int32_t set, size_t row, size_t *at);
+
+/* relu(bias + in matrix) */
+static void rectified_product(const network_state *n, const double *in, size_t inputs,
+                              const float *matrix, const float *bias, size_t outputs, double *out)
+{
+    for (size_t b = 0; b < outputs; b++) {
+        out[b] = weight_at(n->o, bias, b);
+        for (size_t a = 0; a < inputs; a++)
+            out[b] += in[a] * weight_at(n->o, matrix, a * outputs + b);
+        out[b] = fmax(0.0, out[b]);
+    }
+}
+
+static void abstract(const network_state *n, const ascc_layer *layer, const ascc_term *term,
+                     size_t row, double *out)
+{
+    enum { RELATIVE = 0, HIDDEN = 1, MEAN = 2 };
+    const point_set *source = &n->sets->set[n->value[term->source].set];
+    const point *query = &n->sets->set[layer->set].point[row];
+    const size_t inputs = (size_t)term->inputs, outputs = (size_t)term->outputs;
+    const size_t d = (size_t)n->o->model->plan.dimension, hidden = (size_t)term->option[HIDDEN];
+    size_t *nearest = take(source->count, sizeof *nearest), own = 0;
+    double *in = take(inputs + d, sizeof *in), *h = take(hidden, sizeof *h);
+    double *value = take(outputs, sizeof *value), *pooled = take(outputs, sizeof *pooled), r[3];
+    const size_t count = nearest_of(n, term, query, nearest);
+    if (term->option[RELATIVE] != 0.0)
+        shared_row(n, n->value[term->source].set, layer->set, row, &own);
+    for (size_t k = 0; k < count; k++) {
+        displacement(&source->point[nearest[k]], query, r);
+        for (size_t a = 0; a < inputs; a++)
+            in[a] = read_value(n, term->source, term->rectify != 0, nearest[k], (int32_t)a) -
+                    (term->option[RELATIVE] != 0.0
+                         ? read_value(n, term->source, term->rectify != 0, own, (int32_t)a)
+                         : 0.0);
+        for (size_t c = 0; c < d; c++)
+            in[inputs + c] = r[c] / term->filter.radius;
+        rectified_product(n, in, inputs + d, term->tensor[2], term->tensor[3], hidden, h);
+        rectified_product(n, h, hidden, term->tensor[0], term->tensor[1], outputs, value);
+        for (size_t b = 0; b < outputs; b++)
+            pooled[b] = term->option[MEAN] != 0.0 ? pooled[b] + value[b] / (double)count
+                                                  : fmax(pooled[b], value[b]);
+    }
+    for (size_t b = 0; b < outputs; b++)
+        out[b] += pooled[b];
+    free(pooled);
+    free(value);
+    free(h);
+    free(in);
+    free(nearest);
+}
+
+static void interpolate(const network_state *n, const ascc_layer *layer, const ascc_term *term,
+                        size_t row, double *out)
+{
+    const point_set *source = &n->sets->set[n->value[term->source].set];
+    const point *query = &n->sets->set[layer->set].point[row];
+    size_t *nearest = take(source->count, sizeof *nearest);
+    double *in = take((size_t)term->inputs, sizeof *in), r[3], sum = 0.0;
+    const size_t count = nearest_of(n, term, query, nearest);
+    for (size_t k = 0; k < count; k++) {
+        const double q = displacement(&source->point[nearest[k]], query, r) / term->filter.radius;
+        const double weight = 1.0 / (q * q + 1e-6);
+        sum += weight;
+        for (int32_t a = 0; a < term->inputs; a++)
+            in[a] += weight * read_value(n, term->source, term->rectify != 0, nearest[k], a);
+    }
+    for (int32_t a = 0; count && a < term->inputs; a++)
+        in[a] /= sum;
+    for (int32_t a = 0; !term->tensor[ASCC_TENSOR_WEIGHT] && a < term->inputs; a++)
+        out[a] += in[a];
+    if (term->tensor[ASCC_TENSOR_WEIGHT])
+        add_product(n, term, 0, in, out);
+    free(in);
+    free(nearest);
+}
+
 /* The source's row that is the layer's; false where there is none. */
 static bool shared_row(const network_state *n, int32_t source, int32_t set, size_t row, size_t *at)
 {
@@ -625,6 +722,11 @@ static void add_term(const network_state *n, const ascc_layer *layer, const ascc
         add_moments(n, term, row, out);
     } else if (term->operation == &ascc_op_transfer) {
         transfer(n, layer, term, row, out);
+    } else if (term->operation == &ascc_op_abstraction) {
+        abstract(n, layer, term, row, out);
+        return; /* its biases are within */
+    } else if (term->operation == &ascc_op_interpolation) {
+        interpolate(n, layer, term, row, out);
     } else {
         double *in = take((size_t)term->inputs, sizeof *in);
         for (int32_t a = 0; a < term->inputs; a++)
