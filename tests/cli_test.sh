@@ -207,6 +207,16 @@ holds 'show draws the frames it is asked for' sh -c '[ "$(ls shown | tr "\n" " "
 
 run sim demo dam-break-2d --size 8 -n 20 --every 10 -o b.safetensors --threads 3
 holds 'three threads write the same bytes as one' cmp a.safetensors b.safetensors
+cp "$root/examples/models/pbf2d.safetensors" "$root/examples/models/water2d.safetensors" .
+run sim --ladder pbf2d.safetensors,water2d.safetensors --budget 1000000 dam-break-2d --size 8 -n 20 --ply ladder
+holds 'a ladder with time enough runs its best model' grep -q '^  water2d.safetensors  *20 steps' out
+run sim water2d.safetensors dam-break-2d --size 8 -n 20 --ply alone
+holds 'and moves as that model alone' diff -r ladder alone
+run sim --ladder pbf2d.safetensors,water2d.safetensors --budget 0.001 dam-break-2d --size 8 -n 20
+holds 'a ladder without time says that nothing is fast enough' grep -q 'over the budget  *20 of 20 .*no model of the ladder' out
+refuses 2 '--budget takes a --ladder' sim demo dam-break-2d -n 1 --budget 4
+refuses 1 "cannot open 'none'" sim --ladder none dam-break-2d -n 1
+refuses 1 '--ladder takes 1 to 16 models' sim --ladder pbf2d.safetensors,,x dam-break-2d -n 1
 run sim demo a.safetensors -n 10 -o c.safetensors
 report $? 'a run starts from a sequence file'
 run sim demo a.safetensors -n 10 --velocity difference

@@ -245,6 +245,25 @@ static void out_of_memory(const char *path)
     fact(failed > 5 && fails_after < 400, "with enough of it, it runs");
 }
 
+static void ladders(const ascc::context &context, const ascc::model &model)
+{
+    ascc::particles set(context, model), other(context, model);
+    set.add_fluid(exactly(12 * set.dimension(), 0.02f));
+    other.restore(set.snapshot());
+    ascc::ladder ladder(context, {&model, &model}, 1e-9), again(context, {&model, &model});
+    ladder.run(set, 3);
+    fact(ladder.statistics().late == 3 && ladder.choices().size() == 3, "a ladder tells its steps");
+    again.replay(other, ladder.choices());
+    fact(set.hash() == other.hash(), "choices run again give the same bits");
+    again.restore(ladder.snapshot());
+    fact(again.choices() == ladder.choices(), "a snapshot has the choices");
+    again.measure(other);
+    fact(set.hash() == other.hash(), "measuring changes nothing");
+    fact(thrown([&] { again.set_budget(-1.0); }) == ASCC_ERROR_ARGUMENT,
+         "a budget is no less than 0");
+    fact(thrown([&] { ascc::ladder(context, {}); }) == ASCC_ERROR_ARGUMENT, "a ladder has a model");
+}
+
 int main(int, char **argv)
 {
     const ascc::context context;
@@ -254,6 +273,7 @@ int main(int, char **argv)
         short_arrays(context, model);
         handles(context, *path);
         out_of_memory(*path);
+        ladders(context, model);
     }
     return failures != 0;
 }

@@ -68,6 +68,8 @@ class Header(unittest.TestCase):
             "StageTime": "ascc_stage_time",
             "Compression": "ascc_compression",
             "StepStatistics": "ascc_step_statistics",
+            "LadderOptions": "ascc_ladder_options",
+            "LadderStatistics": "ascc_ladder_statistics",
             "Array": "ascc_array",
         }
         lines, wanted = [], []
@@ -318,6 +320,33 @@ class Sets(Case):
             ascc.Step(self.model, context=ascc.Context(threads)).run(water, 10)
             hashes.add(water.hash())
         self.assertEqual(len(hashes), 1)
+
+
+class Ladders(Case):
+    def test_choices_run_again_give_the_same_bits(self):
+        models = [self.model, self.model]
+        d, h = self.set.dimension, self.set.spacing
+        self.set.add_fluid(ascc.block((0.0,) * d, (4,) * d, h))
+        ladder = ascc.Ladder(models, budget=1e-9)
+        start = self.set.snapshot()
+        ladder.run(self.set, 3)
+        told = ladder.statistics
+        self.assertEqual((told.steps, told.late, sum(told.steps_on)), (3, 3, 3))
+        self.assertEqual(told.reason, ascc.LadderReason.TOO_SLOW)
+        self.assertTrue(all(seconds > 0 for seconds in told.predicted))
+        hash_ = self.set.hash()
+        other = ascc.Ladder(models)
+        self.set.restore(start)
+        other.replay(self.set, ladder.choices)
+        self.assertEqual(self.set.hash(), hash_)
+        self.assertEqual(other.statistics.reason, ascc.LadderReason.GIVEN)
+        third = ascc.Ladder(models)
+        third.restore(ladder.snapshot())
+        self.assertEqual(third.choices, ladder.choices)
+        third.set_budget(100.0)
+        third.measure(self.set)
+        third.run(self.set, gravity=[0.0] * self.set.dimension)
+        self.fails(ascc.Status.ARGUMENT, third.replay, self.set, [7], says="rungs[0]")
 
 
 class Life(Case):

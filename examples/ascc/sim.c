@@ -20,6 +20,8 @@
 
 typedef struct options {
     const char *model, *scene, *out, *frames, *ply, *vtk;
+    const char *rungs; /* models by name, commas between them, in place of one */
+    double budget;     /* ms a step, 0 = none */
     int32_t steps, every, threads, size;
     double time_step, spacing;
     int32_t gravity_count; /* 0 = the scene's */
@@ -31,31 +33,36 @@ static void usage(FILE *to)
 {
     fprintf(
         to,
-        "usage: ascc sim MODEL SCENE -n STEPS [-o OUT] [options]\n\n"
+        "usage: ascc sim MODEL SCENE -n STEPS [-o OUT] [options]\n"
+        "       ascc sim --ladder MODEL,MODEL... --budget MS SCENE -n STEPS [-o OUT] [options]\n\n"
         "MODEL  a model by name (water3d) or file, a published network, or demo (a demonstration\n"
         "       model, not trained)\n"
         "SCENE  a sequence file, whose first frame starts the run, or one of (3D without -2d)\n");
     for (const ascc_scene_name *s = ascc_scene_names; s->name; s++)
         fprintf(to, "         %s-2d, %s-3d: %s\n", s->name, s->name, s->text);
-    fprintf(to, "\n"
-                "  -n STEPS           time steps\n"
-                "  -o OUT             a sequence file of all frames\n"
-                "  --frames DIR       one PNG picture a frame\n"
-                "  --ply DIR          one binary PLY file a frame\n"
-                "  --vtk DIR          one VTK file a frame, and frames.pvd for ParaView\n"
-                "  --every K          a frame every K steps (1)\n"
-                "  --threads N        threads to use (1)\n"
-                "  --dt S             time step, seconds (the model's)\n"
-                "  --gravity X,Y[,Z]  m/s^2 (the scene's)\n"
-                "  --size N           particles along a named scene's longest edge\n"
-                "  --spacing S        particle spacing of a named scene, metres (the model's)\n"
-                "  --velocity KIND    of a sequence: stored (default), or difference of its first\n"
-                "                     two frames, starting from the second\n");
+    fprintf(to,
+            "\n"
+            "  -n STEPS           time steps\n"
+            "  -o OUT             a sequence file of all frames\n"
+            "  --frames DIR       one PNG picture a frame\n"
+            "  --ply DIR          one binary PLY file a frame\n"
+            "  --vtk DIR          one VTK file a frame, and frames.pvd for ParaView\n"
+            "  --every K          a frame every K steps (1)\n"
+            "  --threads N        threads to use (1)\n"
+            "  --dt S             time step, seconds (the model's)\n"
+            "  --gravity X,Y[,Z]  m/s^2 (the scene's)\n"
+            "  --ladder M,M...    several models, the best last: each step runs the best that the\n"
+            "                     budget allows\n"
+            "  --budget MS        milliseconds that a step may take, for --ladder\n"
+            "  --size N           particles along a named scene's longest edge\n"
+            "  --spacing S        particle spacing of a named scene, metres (the model's)\n"
+            "  --velocity KIND    of a sequence: stored (default), or difference of its first\n"
+            "                     two frames, starting from the second\n");
 }
 
 static const char *const option_names[] = {
-    "-n",   "-o",        "--frames", "--ply",     "--vtk",      "--every", "--threads",
-    "--dt", "--gravity", "--size",   "--spacing", "--velocity", NULL};
+    "-n",        "-o",     "--frames",  "--ply",      "--vtk",    "--every",  "--threads", "--dt",
+    "--gravity", "--size", "--spacing", "--velocity", "--ladder", "--budget", NULL};
 
 static bool bad_use(const char *what, const char *value)
 {
@@ -132,6 +139,10 @@ static bool read_option(options *o, const char *name, const char *value)
         return real(name, value, 1e-9, 1e9, &o->time_step);
     if (strcmp(name, "--spacing") == 0)
         return real(name, value, 1e-6, 1e6, &o->spacing);
+    if (strcmp(name, "--ladder") == 0)
+        return (o->rungs = value) != NULL;
+    if (strcmp(name, "--budget") == 0)
+        return real(name, value, 1e-3, 1e9, &o->budget);
     if (strcmp(name, "--gravity") == 0)
         return vector(name, value, o->gravity, &o->gravity_count);
     if (strcmp(name, "--velocity") == 0 && strcmp(value, "stored") == 0)
@@ -160,8 +171,16 @@ static bool read_arguments(options *o, int argc, char **argv)
             return bad_use("one argument too many", argv[i]);
         }
     }
+    if (o->rungs && o->scene)
+        return bad_use("with --ladder there is no MODEL before SCENE", o->model);
+    if (o->rungs) {
+        o->scene = o->model;
+        o->model = o->rungs;
+    }
     if (!o->model || !o->scene)
-        return bad_use("MODEL and SCENE are wanted", NULL);
+        return bad_use(o->rungs ? "SCENE is wanted" : "MODEL and SCENE are wanted", NULL);
+    if (o->budget > 0.0 && !o->rungs)
+        return bad_use("--budget takes a --ladder", NULL);
     return o->steps > 0 || bad_use("-n STEPS is wanted", NULL);
 }
 
@@ -241,9 +260,13 @@ typedef struct simulation {
     ascc_sequence scene;
     ascc_view view;
     ascc_context *context;
-    ascc_model *model;
+    ascc_model *model; /* of a ladder: the best */
+    ascc_model *rung[ASCC_MAX_RUNGS];
+    char rung_name[ASCC_MAX_RUNGS][64];
+    size_t rung_count;
     ascc_particles *particles;
-    ascc_step *step;
+    ascc_step *step;     /* or: */
+    ascc_ladder *ladder; /* which was told */
     ascc_sequence_writer *writer;
     ascc_frames exported;
     float *position, *velocity;
@@ -304,15 +327,34 @@ static bool measure(simulation *s, ascc_measures *m)
     return true;
 }
 
+/* Rungs of a ladder have different stages. */
+static void add_stage(simulation *s, const ascc_stage_time *stage)
+{
+    int32_t i = 0;
+    while (i < s->stage_count && strcmp(s->stage[i], stage->name) != 0)
+        i++;
+    if (i == ASCC_MAX_STAGES)
+        return;
+    s->stage_count += i == s->stage_count;
+    s->stage[i] = stage->name;
+    s->seconds[i] += stage->seconds;
+}
+
+static ascc_status run_step(simulation *s, const ascc_forces *forces)
+{
+    return s->ladder ? ascc_ladder_run(s->ladder, s->particles, forces, 1)
+                     : ascc_step_run(s->step, s->particles, forces, 1);
+}
+
 static void count_step(simulation *s)
 {
     ascc_step_statistics t = {.size = sizeof t};
-    (void)ascc_step_get_statistics(s->step, &t);
-    for (int32_t i = 0; i < t.stage_count; i++) {
-        s->stage[i] = t.stage[i].name;
-        s->seconds[i] += t.stage[i].seconds;
-    }
-    s->stage_count = t.stage_count;
+    ascc_ladder_statistics l = {.size = sizeof l};
+    if (s->ladder)
+        (void)ascc_ladder_get_statistics(s->ladder, &l);
+    (void)ascc_step_get_statistics(s->ladder ? ascc_ladder_step(s->ladder, l.rung) : s->step, &t);
+    for (int32_t i = 0; i < t.stage_count; i++)
+        add_stage(s, &t.stage[i]);
     s->seconds_total += t.seconds_total;
     for (int c = 0; c < 3; c++)
         s->drift[c] +=
@@ -327,9 +369,9 @@ static bool advance(simulation *s)
     ascc_progress_start(&progress, "stepping", (size_t)s->o->steps);
     bool good = write_frame(s);
     while (good && s->steps < s->o->steps && !interrupted) {
-        if (ascc_step_run(s->step, s->particles, &forces, 1) != ASCC_OK) {
+        if (run_step(s, &forces) != ASCC_OK) {
             (void)snprintf(s->error, sizeof s->error, "step %d: %s", s->steps + 1,
-                           ascc_step_message(s->step));
+                           s->ladder ? ascc_ladder_message(s->ladder) : ascc_step_message(s->step));
             good = false;
             break;
         }
@@ -388,6 +430,23 @@ static void print_momentum(const simulation *s)
               info.conserves_angular_momentum ? "" : "; this model does not conserve it");
 }
 
+/* Which rungs ran, and how often that was too slow. */
+static void print_ladder(const simulation *s)
+{
+    ascc_ladder_statistics l = {.size = sizeof l};
+    if (!s->ladder || ascc_ladder_get_statistics(s->ladder, &l) != ASCC_OK)
+        return;
+    for (int32_t r = 0; r < l.rung_count; r++)
+        ascc_line(stdout, "  %-17s %9" PRIu64 " steps, %.3f ms expected now", s->rung_name[r],
+                  l.steps_on[r], 1e3 * l.predicted[r]);
+    ascc_line(stdout, "changes of model    %" PRIu64 ", at most one a second simulated", l.changes);
+    if (l.budget > 0.0)
+        ascc_line(stdout, "over the budget     %" PRIu64 " of %d steps took more than %g ms%s",
+                  l.late, s->steps, 1e3 * l.budget,
+                  l.reason == ASCC_LADDER_TOO_SLOW ? "; no model of the ladder is fast enough now"
+                                                   : "");
+}
+
 static void print_table(const simulation *s)
 {
     const double n = s->steps ? s->steps : 1;
@@ -401,6 +460,7 @@ static void print_table(const simulation *s)
     if (s->scene.count)
         ascc_line(stdout, "  %-17s %9.3f us a step", "per particle",
                   1e6 * s->seconds_total / n / (double)s->scene.count);
+    print_ladder(s);
     print_momentum(s);
     ascc_line(stdout, "max. density error  %.1f %%  of rest density, over all frames",
               100.0 * fmax(0.0, s->max_density - 1.0));
@@ -410,6 +470,30 @@ static void print_table(const simulation *s)
 }
 
 /* ---- From arguments to table ---- */
+
+/* The models of a ladder, loaded; the last also becomes s->model. Complains itself. */
+static ascc_status open_rungs(simulation *s, ascc_host_error *why)
+{
+    ascc_status status = ASCC_OK;
+    for (const char *at = s->o->rungs; status == ASCC_OK && *at;) {
+        const size_t length = strcspn(at, ",");
+        char name[ASCC_HOST_PATH];
+        if (length == 0 || length >= sizeof name || s->rung_count == ASCC_MAX_RUNGS) {
+            (void)snprintf(why->text, sizeof why->text, "--ladder takes 1 to %d models",
+                           ASCC_MAX_RUNGS);
+            return ASCC_ERROR_ARGUMENT;
+        }
+        (void)snprintf(name, sizeof name, "%.*s", (int)length, at);
+        const char *slash = strrchr(name, '/');
+        (void)snprintf(s->rung_name[s->rung_count], sizeof *s->rung_name, "%.60s",
+                       slash ? slash + 1 : name);
+        status = ascc_host_load(s->context, name, &s->rung[s->rung_count], why);
+        s->rung_count += status == ASCC_OK;
+        at += length + (at[length] == ',');
+    }
+    s->model = s->rung_count ? s->rung[s->rung_count - 1] : NULL;
+    return status;
+}
 
 /* The scene and the model. A model file says what spacing a built-in scene gets; the demonstration
  * model is made for the scene's. */
@@ -421,7 +505,9 @@ static bool open_model(simulation *s)
     ascc_model_info info = {.size = sizeof info, .particle_spacing = 0.05};
     ascc_host_error why = {""};
     ascc_status status = ascc_context_create(&context, &s->context);
-    if (status == ASCC_OK && !demo)
+    if (status == ASCC_OK && o->rungs)
+        status = open_rungs(s, &why);
+    else if (status == ASCC_OK && !demo)
         status = ascc_host_load(s->context, o->model, &s->model, &why);
     if (status == ASCC_OK && !demo)
         status = ascc_model_get_info(s->model, &info);
@@ -457,12 +543,17 @@ static bool open_step(simulation *s)
             ASCC_OK)
         return false;
     const ascc_step_options settings = {.size = sizeof settings, .time_step = s->o->time_step};
-    const ascc_status status = ascc_step_create(s->context, s->model, &settings, &s->step);
+    const ascc_ladder_options ladder = {
+        .size = sizeof ladder, .budget = 1e-3 * s->o->budget, .step = &settings};
+    const ascc_status status =
+        s->o->rungs ? ascc_ladder_create(s->context, s->rung_count,
+                                         (const ascc_model *const *)s->rung, &ladder, &s->ladder)
+                    : ascc_step_create(s->context, s->model, &settings, &s->step);
     if (status == ASCC_OK)
         return true;
     char message[256];
     (void)ascc_context_message(s->context, message, sizeof message);
-    ascc_host_complain("step", status, message);
+    ascc_host_complain(s->o->rungs ? "ladder" : "step", status, message);
     return false;
 }
 
@@ -499,8 +590,12 @@ static bool open_outputs(simulation *s)
 static void close_all(simulation *s)
 {
     ascc_step_destroy(&s->step);
+    ascc_ladder_destroy(&s->ladder);
     ascc_particles_destroy(&s->particles);
-    ascc_model_destroy(&s->model);
+    if (!s->rung_count)
+        ascc_model_destroy(&s->model);
+    for (size_t r = 0; r < s->rung_count; r++)
+        ascc_model_destroy(&s->rung[r]);
     ascc_context_destroy(&s->context);
     ascc_sequence_free(&s->scene);
     free(s->position);

@@ -579,6 +579,123 @@ ASCC_API ascc_status ascc_step_get_statistics(const ascc_step *step,
 /** The message of the last call on this step that failed, or "". The step's, until its next call. */
 ASCC_API const char *ascc_step_message(const ascc_step *step);
 
+/* ---- Ladder: several models of one fluid, the best that a budget of time allows --------------- */
+
+typedef struct ascc_ladder ascc_ladder;
+#define ASCC_MAX_RUNGS 16
+
+/** Options of ascc_ladder_create. */
+typedef struct ascc_ladder_options {
+    size_t size;   /* sizeof(ascc_ladder_options) */
+    double budget; /* s of the clock that a time step may take; 0 = any: always the top rung */
+    double dwell;  /* s of simulated time between two changes, at least; 0 = 1 */
+    /* What a step's time is taken by: seconds that never run backwards. Called before and after each step on
+     * the calling thread. NULL = the wall clock. A clock of CPU time leaves other programs out. */
+    double (*clock)(void *user);
+    void *user;                    /* handed to the clock */
+    const ascc_step_options *step; /* of all rungs; NULL = defaults */
+} ascc_ladder_options;
+
+/** Why the last step ran on its rung. */
+typedef enum ascc_ladder_reason {
+    ASCC_LADDER_FITS = 0,     /* the best rung that the budget allows, or there is no budget */
+    ASCC_LADDER_FELL = 1,     /* changed: the rung before was about to exceed the budget */
+    ASCC_LADDER_CLIMBED = 2,  /* changed: a better one fits */
+    ASCC_LADDER_WAITS = 3,    /* another one is wanted, but the last change is not `dwell` ago */
+    ASCC_LADDER_TOO_SLOW = 4, /* the budget is exceeded, and no rung is faster */
+    ASCC_LADDER_GIVEN = 5,    /* by ascc_ladder_replay */
+} ascc_ladder_reason;
+
+/**
+ * Makes a ladder (docs/budget.md).
+ *
+ * models    [count], 1 to ASCC_MAX_RUNGS, the best last: such as pbf3d, water3d, water3d-large. Of one
+ *           dimension, spacing, gravity, and time step unless options->step says one. May be destroyed before.
+ * options   NULL for all defaults; read during the call.
+ * errors    ARGUMENT, MISMATCH (models that do not go together), MEMORY, RANGE (as ascc_step_create).
+ * cost      each rung holds a step with its own scratch.
+ * threads   one thread at a time per ladder and per particle set.
+ */
+ASCC_API ascc_status ascc_ladder_create(ascc_context *context, size_t count,
+                                        const ascc_model *const *models,
+                                        const ascc_ladder_options *options, ascc_ladder **ladder);
+ASCC_API void ascc_ladder_destroy(ascc_ladder **ladder);
+
+/**
+ * Advances the fluid by `count` time steps, as ascc_step_run, each on the best rung that is expected to stay within
+ * the budget. What a rung costs is taken from its last steps; a first step with a budget measures all rungs before
+ * it (ascc_ladder_measure). The choice depends on the clock; all else is as promised of ascc_step_run: the choices
+ * made (ascc_ladder_get_choices) give the same bits again (ascc_ladder_replay).
+ *
+ * errors    as ascc_step_run; ascc_ladder_message names the rung.
+ */
+ASCC_API ascc_status ascc_ladder_run(ascc_ladder *ladder, ascc_particles *particles,
+                                     const ascc_forces *forces, int32_t count);
+
+/** As ascc_ladder_run, on the given rungs, int32_t[count]; these become the ladder's choices. errors: also
+ * ARGUMENT (a rung that does not exist; then nothing ran). */
+ASCC_API ascc_status ascc_ladder_replay(ascc_ladder *ladder, ascc_particles *particles,
+                                        const ascc_forces *forces, const int32_t *rungs,
+                                        int32_t count);
+
+/**
+ * Takes the time of each rung on this set: two steps, taken back. Worth a call while a scene loads: without it the
+ * first step with a budget takes as long. errors: as ascc_step_run; the set is as it was either way.
+ */
+ASCC_API ascc_status ascc_ladder_measure(ascc_ladder *ladder, ascc_particles *particles,
+                                         const ascc_forces *forces);
+
+/** Another budget from the next step on, s; 0 = any. errors: ARGUMENT. */
+ASCC_API ascc_status ascc_ladder_set_budget(ascc_ladder *ladder, double budget);
+
+/** What ascc_ladder_get_statistics tells. */
+typedef struct ascc_ladder_statistics {
+    size_t size;        /* sizeof(ascc_ladder_statistics) */
+    int32_t rung_count; /* entries used of the arrays */
+    int32_t steps;      /* that succeeded in the last run */
+    int32_t rung;       /* of the last step, numbered from 0 */
+    int32_t reason;     /* for it, an ascc_ladder_reason */
+    double seconds;     /* that it took, by the clock */
+    double budget;      /* s */
+    double predicted
+        [ASCC_MAX_RUNGS]; /* s, for one more step of that set on each rung; 0 = not measured */
+    /* Since the ladder was made, or restored: */
+    uint64_t steps_on[ASCC_MAX_RUNGS];
+    uint64_t changes; /* of rung */
+    uint64_t late;    /* steps that took longer than the budget */
+    /* Of the last run, quanta of momentum, exact, as in ascc_step_statistics. */
+    int64_t momentum_before[3], momentum_after[3], external_impulse[3], wall_impulse[3];
+} ascc_ladder_statistics;
+
+ASCC_API ascc_status ascc_ladder_get_statistics(const ascc_ladder *ladder,
+                                                ascc_ladder_statistics *statistics);
+
+/** The step of a rung, for ascc_step_get_statistics: the ladder's. NULL if there is no such rung. */
+ASCC_API const ascc_step *ascc_ladder_step(const ascc_ladder *ladder, int32_t rung);
+
+/** Steps that have run since the ladder was made, those before a snapshot included. */
+ASCC_API uint64_t ascc_ladder_step_count(const ascc_ladder *ladder);
+
+/** The rungs of steps [first, first + count), int32_t[count], for ascc_ladder_replay. errors: ARGUMENT. */
+ASCC_API ascc_status ascc_ladder_get_choices(const ascc_ladder *ladder, uint64_t first,
+                                             size_t count, int32_t *rungs);
+
+/** Bytes ascc_ladder_snapshot needs: they grow with the number of changes. */
+ASCC_API size_t ascc_ladder_snapshot_size(const ascc_ladder *ladder);
+
+/**
+ * Writes choices so far and what is known of the rungs' cost, to be kept beside a snapshot of the particles. A
+ * ladder restored from it chooses as this one would, given the same times. errors: ARGUMENT (capacity too small).
+ */
+ASCC_API ascc_status ascc_ladder_snapshot(const ascc_ladder *ladder, void *memory, size_t capacity);
+
+/** errors: ARGUMENT, FORMAT (not a ladder's snapshot, or damaged), MISMATCH (another number of rungs), MEMORY; on
+ * error the ladder is unchanged. Budget, dwell and clock stay the ladder's own. */
+ASCC_API ascc_status ascc_ladder_restore(ascc_ladder *ladder, const void *memory, size_t size);
+
+/** The message of the last call on this ladder that failed, or "". The ladder's, until its next call. */
+ASCC_API const char *ascc_ladder_message(const ascc_ladder *ladder);
+
 #ifdef __cplusplus
 }
 #endif

@@ -621,6 +621,96 @@ class step
     detail::owned<ascc_step, ascc_step_destroy> handle_;
 };
 
+/// Several models of one fluid, the best last: each step runs what a budget of time allows.
+class ladder
+{
+  public:
+    /// seconds: that a step may take; 0: the last model always.
+    ladder(const context &owner, const std::vector<const model *> &models, double seconds = 0.0)
+        : ladder(owner, models, with_budget(seconds))
+    {
+    }
+    ladder(const context &owner, const std::vector<const model *> &models,
+           const ascc_ladder_options &options)
+    {
+        std::vector<const ascc_model *> raw;
+        for (const model *one : models)
+            raw.push_back(one ? one->get() : nullptr);
+        ascc_ladder *made = nullptr;
+        owner.check(ascc_ladder_create(owner.get(), raw.size(), raw.data(), &options, &made));
+        handle_.reset(made);
+    }
+
+    ascc_ladder *get() noexcept
+    {
+        return handle_.get();
+    }
+    const ascc_ladder *get() const noexcept
+    {
+        return handle_.get();
+    }
+    void run(particles &set, std::int32_t count = 1)
+    {
+        check(ascc_ladder_run(get(), set.get(), nullptr, count));
+    }
+    void run(particles &set, const ascc_forces &outside, std::int32_t count = 1)
+    {
+        check(ascc_ladder_run(get(), set.get(), &outside, count));
+    }
+    void replay(particles &set, const std::vector<std::int32_t> &rungs)
+    {
+        check(ascc_ladder_replay(get(), set.get(), nullptr, rungs.data(),
+                                 static_cast<std::int32_t>(rungs.size())));
+    }
+    void measure(particles &set)
+    {
+        check(ascc_ladder_measure(get(), set.get(), nullptr));
+    }
+    void set_budget(double seconds)
+    {
+        check(ascc_ladder_set_budget(get(), seconds));
+    }
+    ascc_ladder_statistics statistics() const
+    {
+        auto statistics = sized<ascc_ladder_statistics>();
+        const ascc_status status = ascc_ladder_get_statistics(get(), &statistics);
+        if (status != ASCC_OK)
+            throw error(status, "statistics");
+        return statistics;
+    }
+    /// The rung of every step so far.
+    std::vector<std::int32_t> choices() const
+    {
+        std::vector<std::int32_t> rungs(static_cast<std::size_t>(ascc_ladder_step_count(get())));
+        check(ascc_ladder_get_choices(get(), 0, rungs.size(), rungs.data()));
+        return rungs;
+    }
+    std::vector<unsigned char> snapshot() const
+    {
+        std::vector<unsigned char> bytes(ascc_ladder_snapshot_size(get()));
+        check(ascc_ladder_snapshot(get(), bytes.data(), bytes.size()));
+        return bytes;
+    }
+    void restore(const std::vector<unsigned char> &bytes)
+    {
+        check(ascc_ladder_restore(get(), bytes.data(), bytes.size()));
+    }
+
+  private:
+    static ascc_ladder_options with_budget(double seconds)
+    {
+        auto options = sized<ascc_ladder_options>();
+        options.budget = seconds;
+        return options;
+    }
+    void check(ascc_status status) const
+    {
+        if (status != ASCC_OK)
+            throw error(status, ascc_ladder_message(get()));
+    }
+    detail::owned<ascc_ladder, ascc_ladder_destroy> handle_;
+};
+
 } // namespace ascc
 
 #endif

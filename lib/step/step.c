@@ -347,7 +347,7 @@ static void take_back(const ascc_step *step, ascc_particles *p)
 static ascc_status run_once(ascc_step *step, ascc_particles *p, const ascc_motion *motion)
 {
     ascc_step_state state;
-    const bool first = step->statistics.steps == 0;
+    const bool first = step->statistics.steps == 0 && !step->continues;
     if (step->substeps > 1 && !keep(step, p))
         return ascc_fail(&step->message, ASCC_ERROR_MEMORY, "no memory to keep %zu particles",
                          p->fluid_count);

@@ -21,6 +21,7 @@ struct ascc_step {
     size_t acceleration_capacity;
     unsigned char *kept; /* the state before the first of several substeps */
     size_t kept_capacity;
+    bool continues; /* the next run adds to impulses of walls that another step's began */
     ascc_step_statistics statistics;
     ascc_message message;
 };

@@ -23,7 +23,8 @@ threads  Calls run without the interpreter's lock. A particle set and a step ser
 life     Handles are freed with their objects, or earlier by close() or `with`.
 """
 
-from ._library import Field, Kind, Status, version
+from ._ladder import Ladder, LadderStatistics
+from ._library import Field, Kind, LadderReason, Status, version
 from ._objects import (
     BodyImpulse,
     Compression,
@@ -51,6 +52,9 @@ __all__ = [
     "FLUID",
     "Field",
     "Kind",
+    "Ladder",
+    "LadderReason",
+    "LadderStatistics",
     "MASS",
     "Measures",
     "Model",

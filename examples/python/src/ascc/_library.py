@@ -26,6 +26,17 @@ class Status(IntEnum):
     LIMIT = -8
 
 
+class LadderReason(IntEnum):
+    """Why a ladder's last step ran on its rung."""
+
+    FITS = 0
+    FELL = 1
+    CLIMBED = 2
+    WAITS = 3
+    TOO_SLOW = 4
+    GIVEN = 5
+
+
 class Kind(IntEnum):
     """Which particles a call means."""
 
@@ -188,12 +199,48 @@ class StepStatistics(Sized):
     ]
 
 
+# Seconds that never run backwards.
+CLOCK = ctypes.CFUNCTYPE(c_double, c_void_p)
+
+
+class LadderOptions(Sized):
+    _fields_ = [
+        ("size", c_size_t),
+        ("budget", c_double),
+        ("dwell", c_double),
+        ("clock", CLOCK),
+        ("user", c_void_p),
+        ("step", ctypes.POINTER(StepOptions)),
+    ]
+
+
+class LadderStatistics(Sized):
+    _fields_ = [
+        ("size", c_size_t),
+        ("rung_count", c_int32),
+        ("steps", c_int32),
+        ("rung", c_int32),
+        ("reason", c_int32),
+        ("seconds", c_double),
+        ("budget", c_double),
+        ("predicted", c_double * 16),
+        ("steps_on", c_uint64 * 16),
+        ("changes", c_uint64),
+        ("late", c_uint64),
+        ("momentum_before", ctypes.c_int64 * 3),
+        ("momentum_after", ctypes.c_int64 * 3),
+        ("external_impulse", ctypes.c_int64 * 3),
+        ("wall_impulse", ctypes.c_int64 * 3),
+    ]
+
+
 # ---- Functions ----
 
 _OUT = ctypes.POINTER(c_void_p)
 _SIZE = ctypes.POINTER(c_size_t)
 _INT = ctypes.c_int
 _ARRAY = ctypes.POINTER(Array)
+_RUNGS = ctypes.POINTER(c_int32)
 
 _FUNCTIONS: Dict[str, Tuple[Any, List[Any]]] = {
     "status_text": (c_char_p, [_INT]),
@@ -243,6 +290,20 @@ _FUNCTIONS: Dict[str, Tuple[Any, List[Any]]] = {
     "step_run": (_INT, [c_void_p, c_void_p, ctypes.POINTER(Forces), c_int32]),
     "step_get_statistics": (_INT, [c_void_p, ctypes.POINTER(StepStatistics)]),
     "step_message": (c_char_p, [c_void_p]),
+    "ladder_create": (_INT, [c_void_p, c_size_t, _OUT, ctypes.POINTER(LadderOptions), _OUT]),
+    "ladder_destroy": (None, [_OUT]),
+    "ladder_run": (_INT, [c_void_p, c_void_p, ctypes.POINTER(Forces), c_int32]),
+    "ladder_replay": (_INT, [c_void_p, c_void_p, ctypes.POINTER(Forces), _RUNGS, c_int32]),
+    "ladder_measure": (_INT, [c_void_p, c_void_p, ctypes.POINTER(Forces)]),
+    "ladder_set_budget": (_INT, [c_void_p, c_double]),
+    "ladder_get_statistics": (_INT, [c_void_p, ctypes.POINTER(LadderStatistics)]),
+    "ladder_step": (c_void_p, [c_void_p, c_int32]),
+    "ladder_step_count": (c_uint64, [c_void_p]),
+    "ladder_get_choices": (_INT, [c_void_p, c_uint64, c_size_t, _RUNGS]),
+    "ladder_snapshot_size": (c_size_t, [c_void_p]),
+    "ladder_snapshot": (_INT, [c_void_p, c_void_p, c_size_t]),
+    "ladder_restore": (_INT, [c_void_p, c_char_p, c_size_t]),
+    "ladder_message": (c_char_p, [c_void_p]),
 }
 
 
