@@ -105,6 +105,34 @@ static void test_what_is_written_is_read_again(void **state)
     }
 }
 
+static void test_walls_that_move_are_read_again(void **state)
+{
+    (void)state;
+    char error[256] = "";
+    ascc_sequence header = header_2d(1), s;
+    header.walls_move = true;
+    header.wall = header.normal = NULL;
+    for (int missing = 0; missing < 2; missing++) {
+        ascc_sequence_writer *w = ascc_sequence_create(path, &header, false, error, sizeof error);
+        assert_non_null(w);
+        for (int t = 0; t < 3; t++) {
+            const float x[2] = {(float)t, 0.0f};
+            const float moved[4] = {(float)t, 0.5f, 1.0f, 0.5f + (float)t};
+            assert_true(ascc_sequence_append(w, x, x, error, sizeof error));
+            assert_true((missing && t == 2) ||
+                        ascc_sequence_append_walls(w, moved, normal, error, sizeof error));
+        }
+        assert_true(ascc_sequence_finish(w, true, error, sizeof error) == !missing);
+    }
+    assert_true(ascc_sequence_read(path, &s, error, sizeof error));
+    assert_true(s.frames == 3 && s.walls == 2 && s.walls_move);
+    for (int t = 0; t < 3; t++) {
+        assert_true(s.wall[4 * t] == (float)t && s.wall[4 * t + 3] == 0.5f + (float)t);
+        assert_memory_equal(s.normal + 4 * t, normal, sizeof normal);
+    }
+    ascc_sequence_free(&s);
+}
+
 static void test_an_empty_scene_is_read_again(void **state)
 {
     (void)state;
@@ -374,6 +402,13 @@ static void test_a_malformed_tensor_is_refused_by_name(void **state)
         {FILE_OF(META, POSITION, VELOCITY, WALL,
                  "\"boundary.normal\":{" F32 "[0,2],\"data_offsets\":[40,40]}"),
          "boundary.normal has 0 rows"},
+        {FILE_OF(META, POSITION, VELOCITY,
+                 "\"boundary.position\":{" F32 "[2,1,2],\"data_offsets\":[32,48]}",
+                 "\"boundary.normal\":{" F32 "[2,1,2],\"data_offsets\":[32,48]}"),
+         "boundary.position has 2 frames, fluid.position 1"},
+        {FILE_OF(META, POSITION, VELOCITY,
+                 "\"boundary.position\":{" F32 "[1,1,2],\"data_offsets\":[32,40]}", NORMAL),
+         "boundary.normal: a shape of 3 numbers"},
     };
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
         write_raw(cases[i].header, strlen(cases[i].header), 48);
@@ -446,6 +481,7 @@ int main(void)
 #define TEST(name) cmocka_unit_test_setup_teardown(name, open_folder, close_folder)
     const struct CMUnitTest tests[] = {
         TEST(test_what_is_written_is_read_again),
+        TEST(test_walls_that_move_are_read_again),
         TEST(test_an_empty_scene_is_read_again),
         TEST(test_a_dropped_file_leaves_the_old_one),
         TEST(test_a_full_disk_is_reported),

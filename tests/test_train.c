@@ -646,16 +646,29 @@ static void a_sequence_with_a_nan_is_refused_by_name(void **state)
     free(m);
 }
 
-static void a_sequence_of_another_time_step_or_too_short_is_refused(void **state)
+static void a_sequence_without_interval_or_too_long_a_one_or_too_short_is_refused(void **state)
 {
     (void)state;
     const model_random random = small(24, 2);
     const ascc_trainer_options o = default_options();
+    const double bad[] = {0.0, -TIME_STEP, NAN, INFINITY};
     motion *m = make_motion(8, 2);
     ascc_trainer *trainer = open_trainer(&o, &random, NULL);
+    for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
+        m->sequence.time_step = bad[i];
+        m->sequence.spacing = 0.0;
+        assert_int_equal(ascc_trainer_add_sequence(trainer, &m->sequence), ASCC_ERROR_ARGUMENT);
+        m->sequence.time_step = TIME_STEP;
+        m->sequence.spacing = bad[i] == 0.0 ? -1.0 : bad[i];
+        assert_int_equal(ascc_trainer_add_sequence(trainer, &m->sequence), ASCC_ERROR_ARGUMENT);
+    }
+    m->sequence.spacing = 0.0;
     m->sequence.time_step = 1.001 * TIME_STEP;
     assert_int_equal(ascc_trainer_add_sequence(trainer, &m->sequence), ASCC_ERROR_MISMATCH);
     m->sequence.time_step = TIME_STEP;
+    m->sequence.spacing = 0.99 * SPACING;
+    assert_int_equal(ascc_trainer_add_sequence(trainer, &m->sequence), ASCC_ERROR_MISMATCH);
+    m->sequence.spacing = 0.0;
     m->sequence.frame_count =
         3; /* one before the start, the start, one after: unroll 2 needs more */
     (void)ascc_trainer_add_sequence(trainer, &m->sequence);
@@ -663,6 +676,154 @@ static void a_sequence_of_another_time_step_or_too_short_is_refused(void **state
     assert_int_equal(ascc_trainer_iterate(trainer, &report), ASCC_ERROR_ARGUMENT);
     ascc_trainer_destroy(&trainer);
     free(m);
+}
+
+/* The same motion in other metres and seconds: powers of two, so that nothing is rounded otherwise. */
+static void rescale(motion *m, float unit, double time)
+{
+    for (size_t k = 0; k < sizeof m->position / sizeof *m->position; k++)
+        m->position[k] *= unit;
+    for (size_t k = 0; k < sizeof m->wall / sizeof *m->wall; k++)
+        m->wall[k] *= unit;
+    m->sequence.spacing = SPACING * (double)unit;
+    m->sequence.time_step = TIME_STEP * time;
+    for (int c = 0; c < 3; c++)
+        m->sequence.gravity[c] *= (double)unit / (time * time); /* what it was */
+}
+
+/* Of a rollout; the gradient is from malloc. */
+static float *gradient_of(ascc_trainer *trainer, int32_t warm_up, double *loss)
+{
+    float *gradient = malloc((ascc_trainer_parameter_count(trainer) + 1) * sizeof *gradient);
+    assert_non_null(gradient);
+    if (ascc_trainer_gradient(trainer, 0, 2, warm_up, 3, loss, gradient) != ASCC_OK)
+        fail_msg("gradient: %s", ascc_trainer_message(trainer));
+    return gradient;
+}
+
+static void
+a_scene_in_other_spacings_has_the_same_gradient_where_time_goes_with_the_root(void **state)
+{
+    (void)state;
+    static const struct {
+        float unit;
+        double time;
+    } cases[] = {{4.0f, 2.0}, {0.25f, 0.5}, {1.0f / 64.0f, 0.125}};
+    for (int d = 2; d <= 3; d++)
+        for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+            const model_random random = everything(1900 + (uint64_t)i, d);
+            ascc_trainer_options o = default_options();
+            o.density_weight = o.wall_weight = o.velocity_weight = 0.3;
+            motion *m = make_motion(12 + (uint64_t)i, d);
+            ascc_trainer *a = open_trainer(&o, &random, m);
+            rescale(m, cases[i].unit, cases[i].time);
+            ascc_trainer *b = open_trainer(&o, &random, m);
+            double loss[2];
+            float *one = gradient_of(a, 1, &loss[0]), *two = gradient_of(b, 1, &loss[1]);
+            assert_true(loss[0] == loss[1] && loss[0] > 0.0);
+            assert_memory_equal(one, two, ascc_trainer_parameter_count(a) * sizeof *one);
+            free(one);
+            free(two);
+            ascc_trainer_destroy(&a);
+            ascc_trainer_destroy(&b);
+            free(m);
+        }
+}
+
+/* A floor that rises and slides by a twentieth of a spacing a frame. */
+static void move_walls(motion *m, float *wall, float *normal)
+{
+    const size_t d = (size_t)m->dimension, n = m->wall_count * d;
+    for (size_t f = 0; f < FRAMES; f++)
+        for (size_t k = 0; k < n; k++) {
+            wall[f * n + k] = m->wall[k] + (float)f * (float)SPACING * (k % d < 2 ? 0.05f : 0.0f);
+            normal[f * n + k] = m->normal[k];
+        }
+    m->sequence.boundary_position = wall;
+    m->sequence.boundary_normal = normal;
+    m->sequence.boundary_moves = 1;
+}
+
+static float moving_wall[FRAMES * MAX_POINTS * 3], moving_normal[FRAMES * MAX_POINTS * 3];
+
+static model_random relaxed(uint64_t seed, int d, char *text, size_t capacity)
+{
+    (void)snprintf(text, capacity,
+                   "{\"support\":%s,\"rest_volume\":%s,\"omega\":[0.5,0.4],\"epsilon\":0.1,"
+                   "\"limit\":%s,\"divergence\":[0.5,0.5]}",
+                   model_number(2.0 * SPACING), model_number(0.8 * pow(SPACING, d)),
+                   model_number(0.2 * SPACING));
+    model_random random = everything(seed, d);
+    random.relaxation = text;
+    return random;
+}
+
+/* Where steps are kept and where they are computed again, walls are where their frame has them. */
+static void walls_that_move_give_the_same_weights_for_any_memory(void **state)
+{
+    (void)state;
+    for (int d = 2; d <= 3; d++) {
+        char text[512];
+        const model_random random = relaxed(1950, d, text, sizeof text);
+        ascc_trainer_options kept = augmented(), again = augmented();
+        again.memory_limit = 1;
+        motion *m = make_motion(13, d);
+        ascc_trainer *still = open_trainer(&kept, &random, m);
+        move_walls(m, moving_wall, moving_normal);
+        ascc_trainer *a = open_trainer(&kept, &random, m);
+        ascc_trainer *b = open_threaded(2, &again, &random, m);
+        iterate(a, 5);
+        iterate(b, 5);
+        iterate(still, 5);
+        assert_same_models(a, b);
+        float *moved = parameters_of(a), *rested = parameters_of(still);
+        assert_memory_not_equal(moved, rested, ascc_trainer_parameter_count(a) * sizeof *moved);
+        free(moved);
+        free(rested);
+        ascc_trainer_destroy(&a);
+        ascc_trainer_destroy(&b);
+        ascc_trainer_destroy(&still);
+        free(m);
+    }
+}
+
+/* A step along the gradient changes the loss as its norm says. */
+static void gradients_beside_walls_that_move_and_of_short_steps_are_right(void **state)
+{
+    (void)state;
+    for (int v = 0; v < 4; v++) {
+        const int d = 2 + v / 2;
+        char text[512];
+        const model_random random = relaxed(1960 + (uint64_t)d, d, text, sizeof text);
+        ascc_trainer_options o = default_options();
+        o.wall_weight = 0.3;
+        motion *m = make_motion(14, d);
+        if (v % 2)
+            m->sequence.time_step = 0.6 * TIME_STEP;
+        else
+            move_walls(m, moving_wall, moving_normal);
+        ascc_trainer *t = open_trainer(&o, &random, m);
+        const size_t count = ascc_trainer_parameter_count(t);
+        double loss, side[2], square = 0.0;
+        float *g = gradient_of(t, 0, &loss), *w = parameters_of(t), *moved = parameters_of(t);
+        for (size_t k = 0; k < count; k++)
+            square += (double)g[k] * (double)g[k];
+        const double length = 1e-3 / sqrt(square);
+        for (int s = 0; s < 2; s++) {
+            for (size_t k = 0; k < count; k++)
+                moved[k] = w[k] + (float)((s ? length : -length) * (double)g[k]);
+            assert_int_equal(ascc_trainer_set_parameters(t, moved), ASCC_OK);
+            assert_int_equal(ascc_trainer_gradient(t, 0, 2, 0, 3, &side[s], NULL), ASCC_OK);
+        }
+        const double slope = (side[1] - side[0]) / (2.0 * length);
+        print_message("# moving walls, short steps: %.6g against %.6g\n", slope, square);
+        assert_true(fabs(slope - square) < 2e-2 * square);
+        free(g);
+        free(w);
+        free(moved);
+        ascc_trainer_destroy(&t);
+        free(m);
+    }
 }
 
 static void a_rollout_that_blows_up_leaves_the_weights_alone(void **state)
@@ -980,7 +1141,11 @@ int main(void)
         cmocka_unit_test(the_hosts_floating_point_environment_changes_no_weight),
         cmocka_unit_test(going_on_from_a_saved_state_gives_the_same_bits),
         cmocka_unit_test(a_sequence_with_a_nan_is_refused_by_name),
-        cmocka_unit_test(a_sequence_of_another_time_step_or_too_short_is_refused),
+        cmocka_unit_test(a_sequence_without_interval_or_too_long_a_one_or_too_short_is_refused),
+        cmocka_unit_test(
+            a_scene_in_other_spacings_has_the_same_gradient_where_time_goes_with_the_root),
+        cmocka_unit_test(walls_that_move_give_the_same_weights_for_any_memory),
+        cmocka_unit_test(gradients_beside_walls_that_move_and_of_short_steps_are_right),
         cmocka_unit_test(a_rollout_that_blows_up_leaves_the_weights_alone),
         cmocka_unit_test(weights_that_compute_nothing_are_taken_back),
         cmocka_unit_test(twenty_iterations_without_a_gradient_stop_training),

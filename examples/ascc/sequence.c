@@ -124,6 +124,11 @@ static bool read_metadata(const file *f, ascc_sequence *s)
 
 /* ---- Reading: tensors ---- */
 
+static size_t rank_of(const file *f, const char *name)
+{
+    return json_array_size(json_object_get(json_object_get(f->header, name), "shape"));
+}
+
 /* An F32 tensor of rank `rank` whose last extent is the dimension; copies its values. */
 static bool tensor(const file *f, const char *name, size_t rank, size_t dimension, size_t shape[3],
                    float **values)
@@ -167,27 +172,41 @@ static bool tensor(const file *f, const char *name, size_t rank, size_t dimensio
     return true;
 }
 
+/* [M, dim], walls at rest, or [T, M, dim]. */
+static bool read_walls(const file *f, ascc_sequence *s)
+{
+    const size_t d = (size_t)s->dimension, rank = rank_of(f, "boundary.position") == 3 ? 3 : 2;
+    size_t c[3], e[3];
+    if (!tensor(f, "boundary.position", rank, d, c, &s->wall) ||
+        !tensor(f, "boundary.normal", rank, d, e, &s->normal))
+        return false;
+    s->walls = c[rank - 2];
+    s->walls_move = rank == 3;
+    if (s->walls_move && c[0] != s->frames)
+        return fail(&f->report, "tensor boundary.position has %zu frames, fluid.position %zu", c[0],
+                    s->frames);
+    return (e[rank - 2] == s->walls && (rank == 2 || e[0] == c[0])) ||
+           fail(&f->report, "tensor boundary.normal has %zu rows, boundary.position %zu",
+                e[rank - 2], s->walls);
+}
+
 static bool read_tensors(const file *f, ascc_sequence *s)
 {
     const size_t d = (size_t)s->dimension;
-    size_t a[3], b[3], c[3], e[3];
+    size_t a[3], b[3];
     if (!tensor(f, "fluid.position", 3, d, a, &s->position) ||
-        !tensor(f, "fluid.velocity", 3, d, b, &s->velocity) ||
-        !tensor(f, "boundary.position", 2, d, c, &s->wall) ||
-        !tensor(f, "boundary.normal", 2, d, e, &s->normal))
+        !tensor(f, "fluid.velocity", 3, d, b, &s->velocity))
         return false;
     s->frames = a[0];
     s->count = a[1];
     s->velocity_frames = b[0];
-    s->walls = c[0];
     if (!s->frames)
         return fail(&f->report, "tensor fluid.position has no frames");
     if (b[1] != s->count || (b[0] != 1 && b[0] != s->frames))
         return fail(&f->report, "tensor fluid.velocity is [%zu, %zu], fluid.position is [%zu, %zu]",
                     b[0], b[1], s->frames, s->count);
-    if (e[0] != s->walls)
-        return fail(&f->report, "tensor boundary.normal has %zu rows, boundary.position %zu", e[0],
-                    s->walls);
+    if (!read_walls(f, s))
+        return false;
     const char *layers = text_of(f, "boundary_layers");
     s->first_layer = layers ? (size_t)strtoul(layers, NULL, 10) : s->walls;
     if (s->first_layer > s->walls)
@@ -231,11 +250,13 @@ void ascc_sequence_velocities(const ascc_sequence *s, size_t frame, float *veloc
 /* ---- Writing ---- */
 
 struct ascc_sequence_writer {
-    ascc_new_file output; /* positions behind room for the header */
-    FILE *velocities;     /* apart till the end */
-    ascc_sequence header; /* walls copied */
+    ascc_new_file output;  /* positions behind room for the header */
+    FILE *velocities;      /* apart till the end */
+    FILE *walls, *normals; /* likewise, where they move */
+    ascc_sequence header;  /* walls copied */
     bool all_velocities;
-    bool broken; /* a frame was written in part */
+    size_t wall_frames; /* appended, of walls that move */
+    bool broken;        /* a frame was written in part */
 };
 
 static bool out_of_order(const report *r)
@@ -253,8 +274,10 @@ static float *copied(const float *from, size_t count)
 
 static void free_writer(ascc_sequence_writer *w)
 {
-    if (w->velocities)
-        (void)fclose(w->velocities);
+    FILE *const apart[] = {w->velocities, w->walls, w->normals};
+    for (size_t i = 0; i < sizeof apart / sizeof *apart; i++)
+        if (apart[i])
+            (void)fclose(apart[i]);
     free(w->header.wall);
     free(w->header.normal);
     free(w);
@@ -269,7 +292,7 @@ ascc_sequence_writer *ascc_sequence_create(const char *path, const ascc_sequence
         (void)fail(&r, "no memory");
         return NULL;
     }
-    const size_t walls = header->walls * (size_t)header->dimension;
+    const size_t walls = header->walls_move ? 0 : header->walls * (size_t)header->dimension;
     w->header = *header;
     w->header.position = w->header.velocity = NULL;
     w->header.frames = w->header.velocity_frames = 0;
@@ -283,7 +306,12 @@ ascc_sequence_writer *ascc_sequence_create(const char *path, const ascc_sequence
     if (good) {
         static const char room[HEADER_ROOM];
         w->velocities = ascc_new_file_scratch(&w->output);
-        good = w->velocities && fwrite(room, 1, sizeof room, w->output.stream) == sizeof room;
+        if (header->walls_move) {
+            w->walls = ascc_new_file_scratch(&w->output);
+            w->normals = ascc_new_file_scratch(&w->output);
+        }
+        good = w->velocities && (!header->walls_move || (w->walls && w->normals)) &&
+               fwrite(room, 1, sizeof room, w->output.stream) == sizeof room;
         if (!good)
             (void)out_of_order(&r);
     }
@@ -306,6 +334,19 @@ bool ascc_sequence_append(ascc_sequence_writer *w, const float *position, const 
         return out_of_order(&r);
     w->header.velocity_frames += moving;
     w->header.frames++;
+    return true;
+}
+
+bool ascc_sequence_append_walls(ascc_sequence_writer *w, const float *wall, const float *normal,
+                                char *error, size_t capacity)
+{
+    const report r = {w->output.path, error, capacity};
+    const size_t n = w->header.walls * (size_t)w->header.dimension;
+    w->broken = w->broken || fwrite(wall, sizeof(float), n, w->walls) != n ||
+                fwrite(normal, sizeof(float), n, w->normals) != n;
+    if (w->broken)
+        return out_of_order(&r);
+    w->wall_frames++;
     return true;
 }
 
@@ -340,7 +381,8 @@ static char *header_text(const ascc_sequence_writer *w)
 {
     const ascc_sequence *h = &w->header;
     const json_int_t d = h->dimension, n = (json_int_t)h->count, m = (json_int_t)h->walls;
-    const size_t row = h->count * (size_t)h->dimension, wall = h->walls * (size_t)h->dimension;
+    const size_t row = h->count * (size_t)h->dimension;
+    const size_t frames = h->walls_move ? h->frames : 1, wall = frames * h->walls * (size_t)d;
     json_t *header = json_object(), *metadata = json_object();
     json_object_set_new(metadata, "format", json_string("ascc.sequence"));
     json_object_set_new(metadata, "version", json_string("1"));
@@ -367,8 +409,12 @@ static char *header_text(const ascc_sequence_writer *w)
           h->frames * row);
     entry(header, "fluid.velocity", json_pack("[I, I, I]", (json_int_t)h->velocity_frames, n, d),
           &offset, h->velocity_frames * row);
-    entry(header, "boundary.position", json_pack("[I, I]", m, d), &offset, wall);
-    entry(header, "boundary.normal", json_pack("[I, I]", m, d), &offset, wall);
+    static const char *const walls[] = {"boundary.position", "boundary.normal"};
+    for (int i = 0; i < 2; i++)
+        entry(header, walls[i],
+              h->walls_move ? json_pack("[I, I, I]", (json_int_t)h->frames, m, d)
+                            : json_pack("[I, I]", m, d),
+              &offset, wall);
     char *written = json_dumps(header, JSON_COMPACT);
     json_decref(header);
     return written;
@@ -394,17 +440,24 @@ static bool write_header(ascc_sequence_writer *w)
            fwrite(room, 1, sizeof room, w->output.stream) == sizeof room;
 }
 
+static bool append_walls(ascc_sequence_writer *w)
+{
+    const size_t walls = w->header.walls * (size_t)w->header.dimension;
+    FILE *out = w->output.stream;
+    if (w->header.walls_move)
+        return w->wall_frames == w->header.frames && append_file(out, w->walls) &&
+               append_file(out, w->normals);
+    return fwrite(w->header.wall, sizeof(float), walls, out) == walls &&
+           fwrite(w->header.normal, sizeof(float), walls, out) == walls;
+}
+
 bool ascc_sequence_finish(ascc_sequence_writer *w, bool keep, char *error, size_t capacity)
 {
     if (!w)
         return false;
     const report r = {w->output.path, error, capacity};
-    const size_t walls = w->header.walls * (size_t)w->header.dimension;
-    FILE *out = w->output.stream;
-    bool good =
-        !keep || (!w->broken && append_file(out, w->velocities) &&
-                  fwrite(w->header.wall, sizeof(float), walls, out) == walls &&
-                  fwrite(w->header.normal, sizeof(float), walls, out) == walls && write_header(w));
+    bool good = !keep || (!w->broken && append_file(w->output.stream, w->velocities) &&
+                          append_walls(w) && write_header(w));
     if (!good)
         (void)out_of_order(&r);
     good = ascc_new_file_close(&w->output, keep && good, error, capacity) && good;

@@ -20,7 +20,8 @@ typedef struct ascc_sequence {
     size_t first_layer;     /* wall points that touch the fluid come first; = walls if not stated */
     float *position;        /* [frames][count][dimension] */
     float *velocity;        /* [velocity_frames][count][dimension] */
-    float *wall, *normal;   /* [walls][dimension] */
+    bool walls_move;        /* they have places in every frame; else at rest */
+    float *wall, *normal;   /* [walls][dimension], or [frames][walls][dimension] */
     char source[1024];      /* who made it */
 } ascc_sequence;
 
@@ -35,12 +36,16 @@ void ascc_sequence_velocities(const ascc_sequence *sequence, size_t frame, float
 typedef struct ascc_sequence_writer ascc_sequence_writer;
 
 /* Metadata and walls come from `header`, whose frames and fluid arrays are not looked at. With
- * all_velocities every frame has velocities, else only the first. NULL with a line in error. */
+ * all_velocities every frame has velocities, else only the first. Walls that move are given frame by frame,
+ * by ascc_sequence_append_walls. NULL with a line in error. */
 ascc_sequence_writer *ascc_sequence_create(const char *path, const ascc_sequence *header,
                                            bool all_velocities, char *error, size_t capacity);
 /* One frame: position and velocity [count][dimension]. */
 bool ascc_sequence_append(ascc_sequence_writer *writer, const float *position,
                           const float *velocity, char *error, size_t capacity);
+/* The walls of the frame appended last, [walls][dimension] each, where they move. */
+bool ascc_sequence_append_walls(ascc_sequence_writer *writer, const float *wall,
+                                const float *normal, char *error, size_t capacity);
 /* Completes and renames the file, or with keep = false drops it. Frees the writer either way. */
 bool ascc_sequence_finish(ascc_sequence_writer *writer, bool keep, char *error, size_t capacity);
 

@@ -579,6 +579,7 @@ static bool open_outputs(simulation *s)
     if (!s->o->out)
         return true;
     ascc_sequence header = s->scene;
+    header.walls_move = false;
     header.time_step = s->time_step * s->o->every;
     if (s->o->gravity_count)
         memcpy(header.gravity, s->o->gravity, sizeof header.gravity);

@@ -129,6 +129,11 @@ static bool add_sequence(training *t, const ascc_train_source *source)
         return fail(t, "train", why);
     const size_t frames = ascc_thin_frames(
         s.position, s.count * (size_t)s.dimension * sizeof *s.position, s.frames, every);
+    const size_t walls = s.walls * (size_t)s.dimension * sizeof *s.wall;
+    if (s.walls_move) {
+        (void)ascc_thin_frames(s.wall, walls, s.frames, every);
+        (void)ascc_thin_frames(s.normal, walls, s.frames, every);
+    }
     const ascc_training_sequence sequence = {.size = sizeof sequence,
                                              .name = last_name(source->path),
                                              .frame_count = frames,
@@ -141,7 +146,9 @@ static bool add_sequence(training *t, const ascc_train_source *source)
                                              .gravity = {s.gravity[0], s.gravity[1], s.gravity[2]},
                                              .share = source->share,
                                              .warm_up = source->warm_up,
-                                             .jitter = source->jitter};
+                                             .jitter = source->jitter,
+                                             .spacing = 2.0 * s.radius,
+                                             .boundary_moves = s.walls_move};
     const ascc_status status = ascc_trainer_add_sequence(t->trainer, &sequence);
     ascc_sequence_free(&s);
     return status == ASCC_OK || fail(t, source->path, ascc_trainer_message(t->trainer));

@@ -2,22 +2,23 @@
 # what. SPDX-License-Identifier: MIT
 # Sourced in examples/train, with $ascc, $out (under runs), $share (per cent of every kind) and $threads.
 
-# kind NAME COUNT [OPTIONS]: sequences of a kind into $out/made, and into $out/train where the linter passes them.
+# kind NAME COUNT [OPTIONS]: sequences of a kind into $out/made, and into $out/train where the linter passes them; of
+# $seed, or 1.
 # Files that exist stay: the same command goes on where it was stopped.
 kind() {
     name=$1
     count=$((($2 * share + 99) / 100))
     shift 2
-    "$ascc" generate "$name" -o "$out/made" --seed 1 --count $count --threads "$threads" "$@"
-    keep "$out/train" "$out/made/${name}_1_"
+    "$ascc" generate "$name" -o "$out/made" --seed ${seed:-1} --count $count --threads "$threads" "$@"
+    keep "$out/train" "$out/made/${name}_${seed:-1}_"
 }
 
 # valid NAME [OPTIONS]: one sequence of another seed into $out/valid.
 valid() {
     name=$1
     shift
-    "$ascc" generate "$name" -o "$out/made" --seed 1001 --count 1 "$@"
-    keep "$out/valid" "$out/made/${name}_1001_"
+    "$ascc" generate "$name" -o "$out/made" --seed $((${seed:-1} + 1000)) --count 1 "$@"
+    keep "$out/valid" "$out/made/${name}_$((${seed:-1} + 1000))_"
 }
 
 # keep FOLDER PREFIX: links there for the files that pass.
@@ -45,7 +46,7 @@ configs() {
                 printf "    \"valid\": [{\"path\": \"%s/valid/*.safetensors\", \"every\": %d}]\n  },\n", out, every
                 inside = 1
             }
-            !inside { gsub(/"runs\//, "\""); print }
+            !inside { gsub(/"runs\//, "\""); gsub(/"\.\.\/models\//, "\"../../../models/"); print }
             /^  },/ { inside = 0 }' "$config" >"runs/plain/$config"
     done
     echo "configs for a clone without other data: $(cd runs/plain && echo *.json)"

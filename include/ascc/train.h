@@ -57,20 +57,25 @@ ASCC_API ascc_status ascc_train_initial_model(ascc_train_context *context, const
 
 typedef struct ascc_trainer ascc_trainer;
 
-/** A sequence to learn from, in metres. Copied by ascc_trainer_add_sequence. */
+/** A sequence to learn from, in metres. Copied by ascc_trainer_add_sequence, in units of the model: with
+ * other spacings as the scene that is the same in the model's, time with the root of length, so that gravity is
+ * what it was. */
 typedef struct ascc_training_sequence {
     size_t size;      /* sizeof(ascc_training_sequence) */
     const char *name; /* for messages */
     size_t frame_count, fluid_count, boundary_count;
     const float *position;          /* [frame][fluid][dimension] */
-    const float *boundary_position; /* [boundary][dimension] */
-    const float *boundary_normal;   /* [boundary][dimension], unit, into the fluid */
-    double time_step;               /* s between frames: the model's, within 1e-4 of it */
-    double gravity[3];              /* m/s^2 */
-    double share;                   /* how often it is drawn, relative to the others; 0 = 1 */
-    int32_t warm_up; /* at most so many steps before those with gradient; 0 = the stage's W */
+    const float *boundary_position; /* [boundary][dimension], or of every frame: boundary_moves */
+    const float *boundary_normal;   /* likewise, unit, into the fluid */
+    double time_step;  /* s between frames: one step, at most time_step_max of the model */
+    double gravity[3]; /* m/s^2 */
+    double share;      /* how often it is drawn, relative to the others; 0 = 1 */
+    int32_t warm_up;   /* at most so many steps before those with gradient; 0 = the stage's W */
     int32_t reserved;
-    double jitter; /* in place of the options', up to so much, drawn; 0 = the options' */
+    double jitter;          /* in place of the options', up to so much, drawn; 0 = the options' */
+    double spacing;         /* m between its particles; 0 = the model's */
+    int32_t boundary_moves; /* 1: the boundary's arrays are [frame][boundary][dimension] */
+    int32_t reserved2;
 } ascc_training_sequence;
 
 /** A stretch of the schedule: until iteration `end`. */
@@ -139,7 +144,8 @@ ASCC_API ascc_status ascc_trainer_create(ascc_train_context *context,
                                          size_t model_size, ascc_trainer **trainer);
 ASCC_API void ascc_trainer_destroy(ascc_trainer **trainer);
 
-/** Adds a sequence to learn from. errors: ARGUMENT, MEMORY, MISMATCH, NOT_FINITE (names the frame). */
+/** Adds a sequence to learn from. errors: ARGUMENT, MEMORY, MISMATCH (an interval longer than the model
+ * steps), NOT_FINITE (names the frame). */
 ASCC_API ascc_status ascc_trainer_add_sequence(ascc_trainer *trainer,
                                                const ascc_training_sequence *sequence);
 

@@ -9,15 +9,36 @@
 #include "points/search.h"
 
 #define BINS 4096 /* of the histograms that percentiles come from */
+#define SAME 1e-4 /* of a spacing or time step: numbers of texts and floats are not exact */
 
 /* ---- Copies ---- */
 
-static float *copy(const ascc_allocator *allocator, const float *from, size_t count)
+static float *copy(const ascc_allocator *allocator, const float *from, size_t count, double unit)
 {
     float *to = ascc_allocate(allocator, count, sizeof *to);
-    if (to && count)
-        memcpy(to, from, count * sizeof *to);
+    for (size_t i = 0; to && i < count; i++)
+        to[i] = (float)((double)from[i] * unit);
     return to;
+}
+
+/* What one metre of the sequence is in the model's, whose spacing its own becomes. */
+static double length_unit_of(const ascc_plan *plan, const ascc_training_sequence *g)
+{
+    const bool own =
+        !(g->spacing > 0.0) || fabs(g->spacing - plan->spacing) <= SAME * plan->spacing;
+    return own ? 1.0 : plan->spacing / g->spacing;
+}
+
+/* Of the interval, in the model's seconds: gravity stays what it is, so time goes with the root of length. */
+static double time_step_of(const ascc_plan *plan, const ascc_training_sequence *g)
+{
+    const double step = g->time_step * sqrt(length_unit_of(plan, g));
+    return fabs(step - plan->time_step) <= SAME * plan->time_step ? plan->time_step : step;
+}
+
+static size_t wall_frames_of(const ascc_training_sequence *g)
+{
+    return g->boundary_moves ? g->frame_count : 1;
 }
 
 static ascc_status check(const ascc_plan *plan, const ascc_training_sequence *g,
@@ -30,19 +51,28 @@ static ascc_status check(const ascc_plan *plan, const ascc_training_sequence *g,
         return ascc_fail(message, ASCC_ERROR_ARGUMENT,
                          "sequence %s: it needs at least 3 frames, fluid, and arrays of all it has",
                          name);
-    if (!(fabs(g->time_step - plan->time_step) <= 1e-4 * plan->time_step))
+    if (!(g->time_step > 0.0) || !(g->spacing >= 0.0) || !isfinite(g->time_step + g->spacing) ||
+        g->boundary_moves < 0 || g->boundary_moves > 1)
+        return ascc_fail(message, ASCC_ERROR_ARGUMENT,
+                         "sequence %s: time_step %g s, spacing %g m or boundary_moves %d makes no "
+                         "sense",
+                         name, g->time_step, g->spacing, (int)g->boundary_moves);
+    if (time_step_of(plan, g) > plan->time_step_max * (1.0 + SAME))
         return ascc_fail(message, ASCC_ERROR_MISMATCH,
-                         "sequence %s: %g s between frames, but the model steps %g s", name,
-                         g->time_step, plan->time_step);
+                         "sequence %s: %g s between frames of %g m are %g s of the model's, whose "
+                         "steps take at most %g s",
+                         name, g->time_step, g->spacing > 0.0 ? g->spacing : plan->spacing,
+                         time_step_of(plan, g), plan->time_step_max);
     for (size_t i = 0; i < g->frame_count * g->fluid_count * d; i++)
         if (!isfinite(g->position[i]))
             return ascc_fail(message, ASCC_ERROR_NOT_FINITE,
                              "sequence %s: frame %zu, particle %zu: a position is not finite", name,
                              i / (g->fluid_count * d), i / d % g->fluid_count);
-    for (size_t i = 0; i < g->boundary_count * d; i++)
+    for (size_t i = 0; i < wall_frames_of(g) * g->boundary_count * d; i++)
         if (!isfinite(g->boundary_position[i]) || !isfinite(g->boundary_normal[i]))
             return ascc_fail(message, ASCC_ERROR_NOT_FINITE,
-                             "sequence %s: boundary row %zu is not finite", name, i / d);
+                             "sequence %s: frame %zu, boundary row %zu is not finite", name,
+                             i / d / g->boundary_count, i / d % g->boundary_count);
     for (int c = 0; c < 3; c++)
         if (!isfinite(g->gravity[c]) || !(g->share >= 0.0) || !isfinite(g->share) ||
             g->warm_up < 0 || !(g->jitter >= 0.0) || !isfinite(g->jitter))
@@ -106,7 +136,7 @@ static ascc_status measure_fluid(ascc_kept_sequence *s, const ascc_plan *plan, s
 }
 
 static ascc_status measure_walls(const ascc_kept_sequence *s, const ascc_plan *plan,
-                                 const double *x, const double *wall,
+                                 const double *x, const double *wall, const float *normal,
                                  const ascc_search_tools *tools, histogram *depth)
 {
     const size_t d = (size_t)s->dimension;
@@ -127,7 +157,7 @@ static ascc_status measure_walls(const ascc_kept_sequence *s, const ascc_plan *p
             nearest = square;
             distance = 0.0;
             for (size_t c = 0; c < d; c++)
-                distance += (x[i * d + c] - wall[j * d + c]) * (double)s->normal[j * d + c];
+                distance += (x[i * d + c] - wall[j * d + c]) * (double)normal[j * d + c];
         }
         if (isfinite(nearest))
             note(depth, distance / plan->spacing);
@@ -148,15 +178,17 @@ static ascc_status measure(ascc_kept_sequence *s, const ascc_allocator *allocato
         h[0].high = 64.0;
         h[1].low = -1.0;
         h[1].high = 1.0;
-        ascc_rigid_transform_apply(&none, s->dimension, s->wall, s->boundary_count, false, x + n);
     }
     for (size_t f = 0; status == ASCC_OK && f < s->frame_count; f++) {
         ascc_arena_reset(tools->arena);
         ascc_rigid_transform_apply(&none, s->dimension, s->position + f * n, s->fluid_count, false,
                                    x);
         status = measure_fluid(s, plan, f, x, tools, &h[0]);
+        const size_t walls = ascc_kept_sequence_walls(s, f);
+        ascc_rigid_transform_apply(&none, s->dimension, s->wall + walls, s->boundary_count, false,
+                                   x + n);
         if (status == ASCC_OK && s->boundary_count)
-            status = measure_walls(s, plan, x, x + n, tools, &h[1]);
+            status = measure_walls(s, plan, x, x + n, s->normal + walls, tools, &h[1]);
     }
     if (status == ASCC_OK) {
         s->dense = percentile(&h[0], 0.95);
@@ -186,10 +218,14 @@ ascc_status ascc_kept_sequence_create(ascc_kept_sequence *s, const ascc_allocato
     s->share = given->share > 0.0 ? given->share : 1.0;
     s->warm_up = given->warm_up;
     s->jitter = given->jitter;
+    s->wall_frames = wall_frames_of(given);
+    const double unit = length_unit_of(plan, given);
+    const size_t walls = s->wall_frames * s->boundary_count * d;
+    s->time_step = time_step_of(plan, given);
     memcpy(s->gravity, given->gravity, sizeof s->gravity);
-    s->position = copy(allocator, given->position, s->frame_count * s->fluid_count * d);
-    s->wall = copy(allocator, given->boundary_position, s->boundary_count * d);
-    s->normal = copy(allocator, given->boundary_normal, s->boundary_count * d);
+    s->position = copy(allocator, given->position, s->frame_count * s->fluid_count * d, unit);
+    s->wall = copy(allocator, given->boundary_position, walls, unit);
+    s->normal = copy(allocator, given->boundary_normal, walls, 1.0);
     s->near = ascc_allocate(allocator, s->frame_count * s->fluid_count, sizeof *s->near);
     status = s->position && s->wall && s->normal && s->near ? ASCC_OK : ASCC_ERROR_MEMORY;
     if (status == ASCC_OK)
@@ -203,13 +239,13 @@ ascc_status ascc_kept_sequence_create(ascc_kept_sequence *s, const ascc_allocato
 
 void ascc_kept_sequence_destroy(ascc_kept_sequence *s, const ascc_allocator *allocator)
 {
-    const size_t d = (size_t)s->dimension;
+    const size_t d = (size_t)s->dimension, walls = s->wall_frames * s->boundary_count * d;
     if (s->position)
         ascc_release(allocator, s->position, s->frame_count * s->fluid_count * d, sizeof(float));
     if (s->wall)
-        ascc_release(allocator, s->wall, s->boundary_count * d, sizeof(float));
+        ascc_release(allocator, s->wall, walls, sizeof(float));
     if (s->normal)
-        ascc_release(allocator, s->normal, s->boundary_count * d, sizeof(float));
+        ascc_release(allocator, s->normal, walls, sizeof(float));
     if (s->near)
         ascc_release(allocator, s->near, s->frame_count * s->fluid_count, sizeof *s->near);
     memset(s, 0, sizeof *s);

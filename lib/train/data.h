@@ -9,11 +9,14 @@
 #include "model/model.h"
 #include "points/neighbors.h"
 
+/* In the model's units: its spacing is that of the particles, and gravity is what it was. */
 typedef struct ascc_kept_sequence {
     char name[128];
     size_t frame_count, fluid_count, boundary_count;
+    size_t wall_frames; /* 1: walls at rest; else all frames */
     int32_t dimension, reserved;
-    float *position, *wall, *normal; /* [frame][fluid][d], [boundary][d] */
+    float *position, *wall, *normal; /* [frame][fluid][d], [wall_frames][boundary][d] */
+    double time_step;                /* s between frames */
     double gravity[3], share;
     int32_t warm_up;   /* at most; 0 = the stage's */
     double jitter;     /* up to, spacings; 0 = the trainer's */
@@ -26,6 +29,11 @@ typedef struct ascc_kept_sequence {
 ascc_status ascc_kept_sequence_create(ascc_kept_sequence *sequence, const ascc_allocator *allocator,
                                       const ascc_plan *plan, const ascc_training_sequence *given,
                                       const ascc_search_tools *tools);
+/* Where the walls of a frame begin in `wall` and `normal`. */
+static inline size_t ascc_kept_sequence_walls(const ascc_kept_sequence *s, size_t frame)
+{
+    return s->wall_frames > 1 ? frame * s->boundary_count * (size_t)s->dimension : 0;
+}
 void ascc_kept_sequence_destroy(ascc_kept_sequence *sequence, const ascc_allocator *allocator);
 
 /* A motion of the whole scene: x -> turn x + shift. */

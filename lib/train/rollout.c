@@ -60,6 +60,7 @@ typedef struct rollout {
     ascc_motion motion;
     size_t numbers, walls; /* coordinates of the fluid, of the walls */
     double *wall, *normal; /* [boundary][dimension] */
+    size_t walls_frame;    /* that they are of, + 1; 0 = none yet */
     double *truth;
     double *state;     /* [unroll + 1] positions before each step, and after the last */
     int64_t *momentum; /* [unroll] before each step */
@@ -98,6 +99,25 @@ static void truth_at(const rollout *r, size_t frame, double *to)
                                s->fluid_count, false, to);
 }
 
+/* The walls where a frame has them, for losses, and for a step from that frame. */
+static void place_walls(rollout *r, size_t frame)
+{
+    const ascc_kept_sequence *s = r->task->sequence;
+    const ascc_rigid_transform *transform = &r->task->transform;
+    const size_t at = ascc_kept_sequence_walls(s, frame);
+    if (r->walls_frame == frame + 1 || (s->wall_frames == 1 && r->walls_frame))
+        return;
+    ascc_rigid_transform_apply(transform, s->dimension, s->wall + at, s->boundary_count, false,
+                               r->wall);
+    ascc_rigid_transform_apply(transform, s->dimension, s->normal + at, s->boundary_count, true,
+                               r->normal);
+    r->walls_frame = frame + 1;
+    if (!r->particles || !r->walls)
+        return;
+    memcpy(r->particles->wall_position, r->wall, r->walls * sizeof *r->wall);
+    memcpy(r->particles->wall_normal, r->normal, r->walls * sizeof *r->normal);
+}
+
 /* Puts the particles where the sequence has them, with velocities by frame difference. */
 static void start_at(rollout *r, size_t frame, ascc_random *random)
 {
@@ -125,10 +145,7 @@ static ascc_status open_particles(rollout *r)
                                             .mass = 1, /* equal masses cancel */
                                             .fluid_capacity = s->fluid_count,
                                             .boundary_capacity = s->boundary_count};
-    ascc_rigid_transform_apply(&r->task->transform, s->dimension, s->wall, s->boundary_count, false,
-                               r->wall);
-    ascc_rigid_transform_apply(&r->task->transform, s->dimension, s->normal, s->boundary_count,
-                               true, r->normal);
+    place_walls(r, r->task->frame);
     truth_at(r, r->task->frame, r->truth);
     const ascc_const_array position = {.data = r->truth, .scalar = ASCC_DOUBLE};
     const ascc_const_array wall = {.data = r->wall, .scalar = ASCC_DOUBLE};
@@ -143,9 +160,10 @@ static ascc_status open_particles(rollout *r)
     return status;
 }
 
-/* A step into this arena. */
-static ascc_status step_into(rollout *r, size_t arena)
+/* A step from a frame into this arena. */
+static ascc_status step_into(rollout *r, size_t frame, size_t arena)
 {
+    place_walls(r, frame);
     return ascc_step_once(r->worker->step, r->particles, &r->motion, true, &r->worker->kept[arena],
                           &r->worker->state[arena]);
 }
@@ -172,7 +190,7 @@ static void prepare(rollout *r, ascc_rollout_result *result)
     start_at(r, r->task->frame, &random);
     r->first_frame = r->task->frame;
     for (int32_t w = 0; w < r->task->warm_up; w++) {
-        const ascc_status status = step_into(r, 0);
+        const ascc_status status = step_into(r, r->first_frame, 0);
         r->first_frame++;
         result->steps++;
         if (status == ASCC_OK && !blown_up(r, r->first_frame))
@@ -230,9 +248,25 @@ static ascc_status loss_at(rollout *r, size_t t, size_t unroll, double *loss, do
     const ascc_search_tools tools = {&r->worker->loss_scratch, r->worker->context->workers,
                                      &r->worker->context->kernels, &message};
     truth_at(r, r->first_frame + t, r->truth);
+    place_walls(r, r->first_frame + t);
     *loss += velocity_loss_at(r, t, unroll, by_velocity);
     return ascc_loss_of(r->task, r->plan, &tools, r->state + t * r->numbers, r->truth, r->wall,
                         r->normal, r->first_frame + t, 1.0 / (double)unroll, loss, by_position);
+}
+
+/* Moving walls, and what their points stand for, as the step from a frame had them. */
+static ascc_status walls_back(rollout *r, size_t frame)
+{
+    ascc_rollout_worker *w = r->worker;
+    ascc_message message;
+    const ascc_search_tools tools = {&w->scratch, w->context->workers, &w->context->kernels,
+                                     &message};
+    place_walls(r, frame);
+    if (r->task->sequence->wall_frames == 1 || !(r->plan->relaxation.support > 0.0))
+        return ASCC_OK;
+    ascc_arena_reset(&w->scratch);
+    return ascc_wall_volumes_update(&w->step->walls, &tools, r->particles,
+                                    ascc_plan_wall_support(r->plan));
 }
 
 /* Gradients after a step become those before it. */
@@ -247,6 +281,8 @@ static ascc_status step_back(rollout *r, size_t t, const ascc_step_state *state,
                                                .velocity = r->by_velocity,
                                                .by_guess = r->by_guess,
                                                .by_before = r->place};
+    if (walls_back(r, r->first_frame + t) != ASCC_OK)
+        return ASCC_ERROR_MEMORY;
     if (r->task->relaxation_gradients &&
         ascc_relaxation_backward(state, &w->scratch, &relaxed) != ASCC_OK)
         return ASCC_ERROR_MEMORY;
@@ -259,7 +295,7 @@ static ascc_status step_back(rollout *r, size_t t, const ascc_step_state *state,
     const ascc_backward pass = {.run = &state->run,
                                 .transposed = r->transposed,
                                 .arena = &w->scratch,
-                                .time_step = w->step->time_step,
+                                .time_step = dt,
                                 .position = r->state + t * n,
                                 .correction = r->by_velocity,
                                 .guess = r->by_guess,
@@ -284,7 +320,8 @@ static size_t go_forwards(rollout *r, ascc_rollout_result *result, size_t *kept_
     for (size_t t = 0; t < unroll; t++) {
         keep_state(r, t);
         const bool kept_step = t == 0 || t >= unroll - kept;
-        const ascc_status status = step_into(r, kept_step ? t % r->worker->kept_count : 0);
+        const ascc_status status =
+            step_into(r, r->first_frame + t, kept_step ? t % r->worker->kept_count : 0);
         if (t == 0)
             kept = count_kept(r, unroll);
         result->status = status == ASCC_ERROR_MEMORY ? status : result->status;
@@ -312,10 +349,10 @@ static void go_back(rollout *r, ascc_rollout_result *result, size_t kept_from, f
         if (result->status == ASCC_OK && t - 1 < kept_from && t - 1 > 0) {
             arena = unroll - 1; /* the last step's: no longer needed */
             restore_state(r, t - 1);
-            result->status = step_into(r, arena);
+            result->status = step_into(r, r->first_frame + t - 1, arena);
         } else if (result->status == ASCC_OK && t == 1 && kept_from > 0) {
             restore_state(r, 0); /* its arena served other steps meanwhile */
-            result->status = step_into(r, 0);
+            result->status = step_into(r, r->first_frame, 0);
         }
         if (result->status == ASCC_OK)
             result->status = step_back(r, t - 1, &r->worker->state[arena], packed);
@@ -333,7 +370,7 @@ static ascc_status open_rollout(rollout *r, ascc_rollout_worker *worker,
     *r = (rollout){.worker = worker, .task = task, .plan = plan};
     r->numbers = task->sequence->fluid_count * d;
     r->walls = task->sequence->boundary_count * d;
-    r->motion = (ascc_motion){.time_step = worker->step->time_step, .advection = plan->advection};
+    r->motion = (ascc_motion){.time_step = task->sequence->time_step, .advection = plan->advection};
     for (size_t c = 0; c < d; c++)
         for (size_t k = 0; k < d; k++)
             r->motion.gravity[c] += task->transform.turn[c][k] * task->sequence->gravity[k];
@@ -350,7 +387,7 @@ ascc_status ascc_rollout_look(ascc_rollout_worker *worker, const ascc_rollout_ta
     if (status == ASCC_OK) {
         start_at(&r, task->frame, &random);
         worker->step->engine = engine;
-        status = step_into(&r, 0);
+        status = step_into(&r, task->frame, 0);
         worker->step->engine = own;
     }
     ascc_particles_destroy(&r.particles);
