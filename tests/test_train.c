@@ -750,11 +750,12 @@ static model_random relaxed(uint64_t seed, int d, char *text, size_t capacity)
 {
     (void)snprintf(text, capacity,
                    "{\"support\":%s,\"rest_volume\":%s,\"omega\":[0.5,0.4],\"epsilon\":0.1,"
-                   "\"limit\":%s,\"divergence\":[0.5,0.5]}",
+                   "\"limit\":%s,\"divergence\":[0.5,0.5],\"guess\":\"guess\"}",
                    model_number(2.0 * SPACING), model_number(0.8 * pow(SPACING, d)),
                    model_number(0.2 * SPACING));
     model_random random = everything(seed, d);
     random.relaxation = text;
+    random.guess = 1;
     return random;
 }
 
@@ -808,7 +809,7 @@ static void gradients_beside_walls_that_move_and_of_short_steps_are_right(void *
         float *g = gradient_of(t, 0, &loss), *w = parameters_of(t), *moved = parameters_of(t);
         for (size_t k = 0; k < count; k++)
             square += (double)g[k] * (double)g[k];
-        const double length = 1e-3 / sqrt(square);
+        const double length = 1e-4 / sqrt(square); /* short of most kinks */
         for (int s = 0; s < 2; s++) {
             for (size_t k = 0; k < count; k++)
                 moved[k] = w[k] + (float)((s ? length : -length) * (double)g[k]);

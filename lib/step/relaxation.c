@@ -357,7 +357,7 @@ static void guess_rows(void *data, size_t begin, size_t end, int32_t slot)
 {
     (void)slot;
     relaxation *r = data;
-    const float unit = (float)(1.0 / r->constants->lattice_response);
+    const float unit = (float)(ascc_step_share(r->state) / r->constants->lattice_response);
     for (size_t i = begin; i < end; i++)
         r->pressure[i] = unit * r->guess[i * ascc_padded(1)];
 }

@@ -64,6 +64,14 @@ typedef struct ascc_step_state {
     ascc_relaxed relaxed;
 } ascc_step_state;
 
+/* What a step of this length does of a displacement that the network gives for the model's: as much as an
+ * acceleration would. */
+static inline double ascc_step_share(const ascc_step_state *state)
+{
+    const double steps = state->motion->time_step / state->network->plan->time_step;
+    return steps * steps;
+}
+
 typedef ascc_status (*ascc_stage)(ascc_step_state *state);
 
 /* v* = v + dt g, and where the network sees the particles. errors: MEMORY, RANGE. */

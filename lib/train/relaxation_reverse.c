@@ -200,16 +200,17 @@ static void divergence(const reverse *r, const double *move, double *to)
 static void guess(reverse *r)
 {
     const int32_t value = r->constants->guess;
+    const double unit = ascc_step_share(r->state) / r->constants->lattice_response;
     for (size_t i = 0; value && i < r->count; i++)
-        r->pressure[i] = (double)r->state->run.value[value].rectified[i * ascc_padded(1)] /
-                         r->constants->lattice_response;
+        r->pressure[i] = unit * (double)r->state->run.value[value].rectified[i * ascc_padded(1)];
 }
 
 static void guess_back(const reverse *r, double *by_guess)
 {
+    const double unit = ascc_step_share(r->state) / r->constants->lattice_response;
     for (size_t i = 0; r->constants->guess && i < r->count; i++)
         by_guess[ascc_hierarchy_host_row(&r->state->hierarchy, ASCC_SET_FLUID, i)] =
-            r->by_pressure[i] / r->constants->lattice_response;
+            unit * r->by_pressure[i];
 }
 
 static void sweep(reverse *r)
