@@ -61,6 +61,8 @@ typedef struct ascc_network_run {
     ascc_value *value;
     ascc_rows *rows;  /* [key_count] */
     uint32_t **table; /* [key_count] what operations make of a list, else NULL */
+    float
+        gravity[8]; /* of the step, in units of the model's own (if that is 0: m/s^2), then zeros */
     size_t neighbor_count;
     uint32_t longest;
 } ascc_network_run;

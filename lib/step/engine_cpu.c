@@ -2,6 +2,8 @@
  * SPDX-License-Identifier: MIT */
 #include "engine.h"
 
+#include <math.h>
+
 /* Quanta per kilogram and unit of the network's output: the output is a displacement during the
  * model's time step; with another one, the velocity it stands for is scaled as an acceleration. */
 static ascc_impulse_scale impulse_scale(const ascc_step_state *state)
@@ -14,6 +16,18 @@ static ascc_impulse_scale impulse_scale(const ascc_step_state *state)
                           (state->motion->time_step / plan->time_step) / state->length_unit /
                           p->quantum;
     return scale;
+}
+
+/* How gravity differs from what the model was trained with. */
+static void tell_gravity(ascc_step_state *state)
+{
+    const ascc_plan *plan = state->network->plan;
+    double square = 0.0;
+    for (int32_t c = 0; c < plan->dimension; c++)
+        square += plan->gravity[c] * plan->gravity[c];
+    for (int32_t c = 0; c < plan->dimension; c++)
+        state->run.gravity[c] = (float)(state->motion->gravity[c] * state->length_unit /
+                                        (square > 0.0 ? sqrt(square) : 1.0));
 }
 
 static void tell(ascc_step_state *state)
@@ -35,8 +49,10 @@ ascc_status ascc_engine_cpu(ascc_step_state *state)
         status = ascc_network_demand(&state->run, state->network, &state->hierarchy, &state->tools,
                                      state->expected);
     ascc_stage_lap(state, "search");
-    if (status == ASCC_OK)
+    if (status == ASCC_OK) {
+        tell_gravity(state);
         status = ascc_network_forward(&state->run, state->fluid_features, state->boundary_features);
+    }
     ascc_arena_return(state->tools.arena, state->before_features);
     ascc_stage_lap(state, "network");
     if (status == ASCC_OK) {
