@@ -132,6 +132,7 @@ plain='version|status_text|(train_)?context_.*|[a-z]+_(destroy|message)|model_(s
 plain="$plain|particles_(reserve|remove|clear|count|capacity|dimension|find|snapshot_size|momentum_quantum)"
 plain="$plain|ladder_(step|step_count|get_choices|snapshot_size)"
 plain="$plain|particles_(total_momentum|get_(ids|bodies|momentum))"
+plain="$plain|body_remove|bodies_list"
 awk '/^[a-z].*[ *]ascc_[a-z_]+\(/ && !/;/ { sub(/\(.*/, ""); sub(/.*[ *]/, ""); name = $0 }
     body { if (/ASCC_FLOAT_SCOPE;/) print name }
     { body = /^\{/ }' $lib >"$scratch/scopes"

@@ -1,5 +1,5 @@
 #!/bin/sh
-# The C in README.md and docs/getting-started.md compiles, that of other pages is what the tests run;
+# The C in README.md, docs/getting-started.md, walls.md and bodies.md compiles, that of other pages is what the tests run;
 # prints TAP. $1: a build folder. SPDX-License-Identifier: MIT
 cd "$(dirname "$0")/.." || exit 1
 build=${1:-build}
@@ -7,7 +7,7 @@ folder=$(mktemp -d) || exit 1
 trap 'rm -rf "$folder"' EXIT
 number=0
 failed=0
-for page in README.md docs/getting-started.md docs/walls.md; do
+for page in README.md docs/getting-started.md docs/walls.md docs/bodies.md; do
     number=$((number + 1))
     source="$folder/page.c"
     {

@@ -21,7 +21,7 @@
 #define SEQUENCES 10000
 #endif
 
-enum { MOST = 96, CALLS = 30, MODELS = 4, SIZES = 3 };
+enum { MOST = 96, CALLS = 30, MODELS = 4, SIZES = 3, MOST_BODIES = 4 };
 
 static const double spacing = 0.05;
 
@@ -106,6 +106,9 @@ typedef struct sequence {
     shadow_row row[2][MOST]; /* by ascc_kind */
     size_t count[2];
     uint64_t last_id;
+    int32_t body[MOST_BODIES]; /* that have a frame */
+    size_t body_count;
+    int32_t last_body; /* the highest number so far */
 } sequence;
 
 #define CHECK(condition)                                                                           \
@@ -323,6 +326,14 @@ static void add_bad_fluid(sequence *s)
     check_refused(s, status, wanted == ASCC_OK ? status : wanted, before);
 }
 
+static bool has_frame(const sequence *s, int32_t body)
+{
+    for (size_t b = 0; b < s->body_count; b++)
+        if (s->body[b] == body)
+            return true;
+    return false;
+}
+
 static void add_boundary(sequence *s)
 {
     const size_t n = below(s, 9), first = s->count[ASCC_BOUNDARY], d = s->width;
@@ -333,6 +344,13 @@ static void add_boundary(sequence *s)
         return;
     lay_out(s, &x, n, d);
     lay_out(s, &v, n, d);
+    if (has_frame(s, body)) {
+        const uint64_t before = ascc_particles_hash(s->particles);
+        check_refused(s, ascc_particles_add_boundary(s->particles, n, &x.from, &v.from, body, ids),
+                      ASCC_ERROR_ARGUMENT, before);
+        return;
+    }
+    s->last_body = n > 0 && body > s->last_body ? body : s->last_body;
     for (size_t i = 0; i < n; i++) {
         shadow_row *row = &s->row[ASCC_BOUNDARY][first + i];
         const size_t axis = below(s, d);
@@ -356,7 +374,7 @@ static void add_bad_boundary(sequence *s)
     double x[3] = {0.0, 0.0, 0.0}, n[3] = {1.0, 0.0, 0.0};
     const ascc_const_array position = {.data = x, .scalar = ASCC_DOUBLE};
     const ascc_const_array normal = {.data = n, .scalar = ASCC_DOUBLE}, none = {0};
-    int32_t body = 0;
+    int32_t body = s->last_body + 1;
     const ascc_const_array *given = &normal;
     ascc_status wanted = ASCC_ERROR_ARGUMENT;
     switch (below(s, 5)) {
@@ -417,6 +435,153 @@ static void remove_wrongly(sequence *s)
     check_refused(s, ascc_particles_remove(s->particles, 2, ids), ASCC_ERROR_ARGUMENT, before);
 }
 
+/* Where points of bodies are is the library's to say: tests/test_bodies.c holds it against an oracle. */
+static void follow_bodies(sequence *s)
+{
+    for (size_t i = 0; i < s->count[ASCC_BOUNDARY]; i++) {
+        shadow_row *row = &s->row[ASCC_BOUNDARY][i];
+        const ascc_array x = {.data = row->position, .scalar = ASCC_DOUBLE};
+        const ascc_array n = {.data = row->normal, .scalar = ASCC_DOUBLE};
+        if (!has_frame(s, row->body))
+            continue;
+        CHECK(ascc_particles_get(s->particles, ASCC_BOUNDARY, ASCC_POSITION, i, 1, &x) == ASCC_OK);
+        CHECK(ascc_particles_get(s->particles, ASCC_BOUNDARY, ASCC_NORMAL, i, 1, &n) == ASCC_OK);
+    }
+}
+
+static ascc_pose some_pose(sequence *s)
+{
+    ascc_pose pose = {.size = sizeof pose, .jump = once_in(s, 2) ? (double)INFINITY : 10 * spacing};
+    const bool moves = once_in(s, 2);
+    for (size_t c = 0; c < s->width; c++) {
+        pose.position[c] = some_position(s);
+        pose.velocity[c] = moves ? 0.3 * some_velocity(s) : 0.0;
+    }
+    if (s->d == 2) {
+        pose.angle = between(s, -10.0, 10.0);
+        pose.spin[2] = moves ? between(s, -9.0, 9.0) : 0.0;
+        return pose;
+    }
+    double square = 0.0;
+    for (int c = 0; c < 4; c++) {
+        pose.rotation[c] = between(s, -1.0, 1.0) + (c == 3 ? 2.0 : 0.0);
+        square += pose.rotation[c] * pose.rotation[c];
+    }
+    for (int c = 0; c < 4; c++)
+        pose.rotation[c] /= sqrt(square);
+    for (int c = 0; c < 3; c++)
+        pose.spin[c] = moves ? between(s, -9.0, 9.0) : 0.0;
+    return pose;
+}
+
+static void add_body(sequence *s)
+{
+    static const double half = 0.8 * spacing;
+    const ascc_shape shape = {.size = sizeof shape,
+                              .kind = (ascc_shape_kind)(1 + below(s, 5)),
+                              .water = (ascc_water)below(s, 2),
+                              .half = {half, half, half},
+                              .radius = half,
+                              .pitch = 1.6 * spacing};
+    const ascc_pose pose = some_pose(s);
+    const size_t first = s->count[ASCC_BOUNDARY];
+    int32_t body;
+    ascc_body_info info = {.size = sizeof info};
+    if (s->body_count == MOST_BODIES || first + 40 > MOST)
+        return;
+    CHECK(ascc_body_add(s->particles, &shape, once_in(s, 4) ? NULL : &pose, &body) == ASCC_OK);
+    CHECK(body == s->last_body + 1);
+    CHECK(ascc_body_get(s->particles, body, &info) == ASCC_OK);
+    CHECK(info.first == first && info.count > 0 && first + info.count <= MOST);
+    for (size_t i = first; i < first + info.count; i++) {
+        uint64_t id;
+        CHECK(ascc_particles_get_ids(s->particles, ASCC_BOUNDARY, i, 1, &id) == ASCC_OK);
+        CHECK(id > s->last_id);
+        s->row[ASCC_BOUNDARY][i] = (shadow_row){.id = s->last_id = id, .body = body};
+    }
+    s->count[ASCC_BOUNDARY] += info.count;
+    s->body[s->body_count++] = s->last_body = body;
+    follow_bodies(s);
+}
+
+static void move_body(sequence *s)
+{
+    const ascc_pose pose = some_pose(s);
+    const uint64_t before = ascc_particles_hash(s->particles);
+    if (!s->body_count)
+        return;
+    const ascc_status status =
+        ascc_body_move(s->particles, s->body[below(s, s->body_count)], &pose);
+    if (status != ASCC_OK) /* only a jump */
+        check_refused(s, status, ASCC_ERROR_RANGE, before);
+    CHECK(status == ASCC_OK || isfinite(pose.jump));
+    follow_bodies(s);
+}
+
+static void move_wrongly(sequence *s)
+{
+    const uint64_t before = ascc_particles_hash(s->particles);
+    ascc_pose pose = some_pose(s);
+    ascc_status wanted = ASCC_ERROR_ARGUMENT;
+    int32_t body = s->body_count ? s->body[0] : 0, bodies[2] = {body, s->last_body + 1};
+    int64_t impulse[2][3];
+    CHECK(ascc_bodies_impulse(s->particles, 2, bodies, impulse, NULL) == ASCC_ERROR_ARGUMENT);
+    switch (s->body_count ? below(s, 5) : 0) {
+    case 0:
+        body = once_in(s, 2) ? s->last_body + 1 : -1;
+        break;
+    case 1:
+        pose.position[below(s, s->width)] = bad_number(s);
+        wanted = ASCC_ERROR_NOT_FINITE;
+        break;
+    case 2:
+        pose.spin[2] = bad_number(s);
+        wanted = ASCC_ERROR_NOT_FINITE;
+        break;
+    case 3:
+        pose.rotation[0] += 3.0;
+        break;
+    default:
+        pose.jump = -1.0;
+        break;
+    }
+    check_refused(s, ascc_body_move(s->particles, body, &pose), wanted, before);
+}
+
+static void remove_body(sequence *s)
+{
+    const uint64_t before = ascc_particles_hash(s->particles);
+    check_refused(s, ascc_body_remove(s->particles, s->last_body + 1), ASCC_ERROR_ARGUMENT, before);
+    if (!s->body_count)
+        return;
+    const size_t which = below(s, s->body_count);
+    const int32_t body = s->body[which];
+    CHECK(ascc_body_remove(s->particles, body) == ASCC_OK);
+    for (size_t i = s->count[ASCC_BOUNDARY]; i; i--)
+        if (s->row[ASCC_BOUNDARY][i - 1].body == body)
+            drop_row(s, ASCC_BOUNDARY, i - 1);
+    memmove(s->body + which, s->body + which + 1, (s->body_count - which - 1) * sizeof *s->body);
+    s->body_count--;
+}
+
+static void check_bodies(sequence *s)
+{
+    int32_t bodies[MOST_BODIES + 1];
+    CHECK(ascc_bodies_list(s->particles, MOST_BODIES + 1, bodies) == s->body_count);
+    for (size_t b = 0; b < s->body_count; b++) {
+        ascc_body_info info = {.size = sizeof info};
+        size_t count = 0;
+        CHECK(bodies[b] == s->body[b]);
+        CHECK(ascc_body_get(s->particles, bodies[b], &info) == ASCC_OK);
+        for (size_t i = 0; i < s->count[ASCC_BOUNDARY]; i++)
+            if (s->row[ASCC_BOUNDARY][i].body == bodies[b]) {
+                CHECK(i >= info.first);
+                count++;
+            }
+        CHECK(info.count == count);
+    }
+}
+
 static void resize(sequence *s)
 {
     const size_t before = s->count[ASCC_FLUID], wanted = below(s, before + 6);
@@ -439,6 +604,8 @@ static void clear_one(sequence *s)
     const int kind = (int)below(s, 2);
     CHECK(ascc_particles_clear(s->particles, (ascc_kind)kind) == ASCC_OK);
     s->count[kind] = 0;
+    if (kind == ASCC_BOUNDARY)
+        s->body_count = 0;
 }
 
 static void set_some(sequence *s)
@@ -563,6 +730,7 @@ static void follow_positions(sequence *s)
         for (size_t c = 0; c < s->width; c++)
             CHECK(isfinite(s->row[ASCC_FLUID][i].position[c]));
     }
+    follow_bodies(s);
 }
 
 static void check_momentum(sequence *s, const int64_t before[3])
@@ -573,7 +741,7 @@ static void check_momentum(sequence *s, const int64_t before[3])
     CHECK(t.steps == 1);
     CHECK(ascc_particles_total_momentum(s->particles, after) == ASCC_OK);
     CHECK(ascc_particles_body_impulse(s->particles, -1, NULL, all, NULL) == ASCC_OK);
-    for (int32_t body = 0; body < 3; body++) {
+    for (int32_t body = 0; body <= s->last_body; body++) {
         int64_t one[3];
         CHECK(ascc_particles_body_impulse(s->particles, body, NULL, one, NULL) == ASCC_OK);
         for (int c = 0; c < 3; c++)
@@ -718,7 +886,8 @@ static void run_beside_twin(sequence *s)
     bool same = true;
     const int32_t steps = (int32_t)below(s, 4);
     ascc_context *context = contexts[below(s, SIZES)];
-    const bool reversed = once_in(s, 2);
+    const bool reversed =
+        once_in(s, 2) && !s->body_count; /* whose numbers follow from their order */
     ascc_particles *twin = reversed ? reversed_twin(s, context, &same) : restored_twin(s, context);
     ascc_step *step = NULL;
     some_forces(s, &p);
@@ -830,6 +999,7 @@ static void check_all(sequence *s)
     int32_t bodies[MOST];
     check_ids(s, ASCC_FLUID);
     check_ids(s, ASCC_BOUNDARY);
+    check_bodies(s);
     check_field(s, ASCC_FLUID, ASCC_POSITION);
     check_field(s, ASCC_FLUID, ASCC_MASS);
     check_field(s, ASCC_BOUNDARY, ASCC_POSITION);
@@ -847,6 +1017,7 @@ static void open_sequence(sequence *s, uint64_t seed)
 {
     memset(s, 0, sizeof *s);
     s->seed = s->random.state = seed;
+    s->last_body = -1;
     (void)test_random_bits(&s->random);
     s->d = 2 + (int32_t)below(s, 2);
     s->width = (size_t)s->d;
@@ -881,11 +1052,12 @@ static void close_sequence(sequence *s)
 static void run_sequence(uint64_t seed)
 {
     static void (*const calls[])(sequence *) = {
-        add_fluid,       add_fluid,        add_fluid,        add_boundary,    add_boundary,
-        add_bad_fluid,   add_bad_boundary, remove_some,      remove_wrongly,  resize,
-        set_some,        set_some,         set_wrongly,      restore_garbage, ask_wrongly,
-        run_step,        run_step,         run_step,         run_step,        run_with_bad_forces,
-        run_beside_twin, run_beside_twin,  run_out_of_memory};
+        add_fluid,       add_fluid,        add_fluid,         add_boundary,    add_boundary,
+        add_bad_fluid,   add_bad_boundary, remove_some,       remove_wrongly,  resize,
+        set_some,        set_some,         set_wrongly,       restore_garbage, ask_wrongly,
+        run_step,        run_step,         run_step,          run_step,        run_with_bad_forces,
+        run_beside_twin, run_beside_twin,  run_out_of_memory, add_body,        move_body,
+        move_body,       move_wrongly,     remove_body};
     static sequence one;
     sequence *s = &one;
     open_sequence(s, seed);

@@ -1424,7 +1424,7 @@ static void the_snapshot_is_the_documented_words(void **state)
     self->set->wall_impulse[1] = -2;
     self->set->wall_velocity[0] = 0.75;
     const uint64_t expected[] = {UINT64_C(0x50414e5343435341),
-                                 2,
+                                 3,
                                  2,
                                  1,
                                  1,
@@ -1447,6 +1447,12 @@ static void the_snapshot_is_the_documented_words(void **state)
                                  2,
                                  6,
                                  test_bits(0.75),
+                                 0,
+                                 0,
+                                 0,
+                                 0,
+                                 0, /* in no body's frame */
+                                 7, /* the next body, and no body */
                                  0,
                                  0};
     unsigned char bytes[sizeof expected];
@@ -1497,7 +1503,8 @@ static void impossible_snapshots_with_a_right_checksum_are_refused(void **state)
     fixture *const self = *state; /* 2D: header 9 words, then the arrays of 2 + 2 particles */
     add_scene(self->set, 29, 2, 2);
     enum { FLUID = 9, POSITION = 9, MOMENTUM = 13, MASS = 17, ID = 19, WALL_POSITION = 21 };
-    enum { NORMAL = 25, WALL_ID = 33, BODY = 35, WALL_VELOCITY = 37, WORDS = 42 };
+    enum { NORMAL = 25, WALL_ID = 33, BODY = 35, WALL_VELOCITY = 37 };
+    enum { OWN_POSITION = 41, OWN_NORMAL = 45, NEXT_BODY = 49, BODIES = 50, WORDS = 52 };
     static const struct {
         size_t word;
         uint64_t value;
@@ -1505,7 +1512,8 @@ static void impossible_snapshots_with_a_right_checksum_are_refused(void **state)
     } cases[] = {
         {1, 0, ASCC_ERROR_FORMAT}, /* version */
         {1, 1, ASCC_ERROR_FORMAT}, /* which has fewer words */
-        {1, 3, ASCC_ERROR_FORMAT},
+        {1, 2, ASCC_ERROR_FORMAT},
+        {1, 4, ASCC_ERROR_FORMAT},
         {2, 1, ASCC_ERROR_FORMAT}, /* dimension */
         {2, 4, ASCC_ERROR_FORMAT},
         {2, UINT64_MAX, ASCC_ERROR_FORMAT},
@@ -1544,6 +1552,13 @@ static void impossible_snapshots_with_a_right_checksum_are_refused(void **state)
         {BODY + 1, UINT64_MAX, ASCC_ERROR_FORMAT},
         {WALL_VELOCITY, UINT64_C(0x7ff8000000000000), ASCC_ERROR_FORMAT},
         {WALL_VELOCITY + 3, UINT64_C(0x7fe0000000000000), ASCC_ERROR_FORMAT},
+        {OWN_POSITION, UINT64_C(0x7ff8000000000000), ASCC_ERROR_FORMAT},
+        {OWN_NORMAL + 1, UINT64_C(0x7ff8000000000000), ASCC_ERROR_FORMAT},
+        {OWN_NORMAL, UINT64_C(0x4000000000000000), ASCC_ERROR_FORMAT},
+        {NEXT_BODY, 0, ASCC_ERROR_FORMAT}, /* which points have */
+        {NEXT_BODY, (UINT64_C(1) << 31) + 1, ASCC_ERROR_FORMAT},
+        {BODIES, 1, ASCC_ERROR_FORMAT},
+        {BODIES, UINT64_MAX, ASCC_ERROR_FORMAT},
     };
     const picture good = take_picture(self->set);
     assert_int_equal(good.size, 8 * WORDS);
@@ -1747,8 +1762,8 @@ static uint64_t fingerprint(const unsigned char *bytes, size_t size)
     return sum;
 }
 
-/* Taken when every array was still written by hand: snapshots of that time must be read for ever. They lack the
- * velocities of walls, which end the others. */
+/* Taken when every array was still written by hand: snapshots of that time must be read for ever. They end before
+ * what versions added: velocities of walls, then places in the frames of bodies, and bodies. */
 static void assert_golden(fixture *self, uint64_t snapshot, uint64_t hash)
 {
     add_scene(self->set, 36, 37, 23);
@@ -1756,20 +1771,28 @@ static void assert_golden(fixture *self, uint64_t snapshot, uint64_t hash)
     assert_int_equal(ascc_particles_remove(self->set, 4, gone), ASCC_OK);
     assert_int_equal(ascc_particles_resize_fluid(self->set, 35), ASCC_OK);
     const picture taken = take_picture(self->set);
-    const size_t size =
-        taken.size - self->set->boundary_count * (size_t)self->set->dimension * sizeof(double);
-    unsigned char *const old = malloc(size);
-    memcpy(old, taken.bytes, size);
-    put_test_word(old, 1, 1);
-    seal(old, size / 8);
-    if (fingerprint(old, size) != snapshot)
-        fail_msg("snapshot %llx", (unsigned long long)fingerprint(old, size));
+    const size_t vectors = self->set->boundary_count * (size_t)self->set->dimension * 8;
     if (ascc_particles_hash(self->set) != hash)
         fail_msg("hash %llx", (unsigned long long)ascc_particles_hash(self->set));
-    self->set->wall_velocity[2] = 1; /* which the old snapshot takes away again */
-    assert_int_equal(ascc_particles_restore(self->set, old, size), ASCC_OK);
-    assert_same_picture(self->set, taken);
-    free(old);
+    for (size_t version = 1; version <= 2; version++) {
+        const size_t size = taken.size - 16 - (version == 1 ? 3 : 2) * vectors;
+        unsigned char *const old = malloc(size);
+        memcpy(old, taken.bytes, size);
+        put_test_word(old, 1, version);
+        seal(old, size / 8);
+        if (version == 1 && fingerprint(old, size) != snapshot)
+            fail_msg("snapshot %llx", (unsigned long long)fingerprint(old, size));
+        self->set->wall_velocity[2] = self->set->wall_own_position[1] =
+            1; /* which goes away again */
+        self->set->next_body = 0;
+        assert_int_equal(ascc_particles_restore(self->set, old, size), ASCC_OK);
+        const picture now = take_picture(self->set);
+        assert_int_equal(now.size, taken.size);
+        assert_memory_equal(now.bytes, taken.bytes, now.size);
+        free(now.bytes);
+        free(old);
+    }
+    free(taken.bytes);
 }
 
 static void snapshot_and_hash_in_2d_are_those_of_version_1(void **state)

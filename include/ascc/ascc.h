@@ -430,8 +430,8 @@ ASCC_API ascc_status ascc_particles_restore(ascc_particles *particles, const voi
                                             size_t size);
 
 /**
- * A hash of all positions, momenta, masses, normals, velocities of walls and bodies. It does not depend on the order of
- * rows or on ids: equal scenes added in another order have equal hashes. cost: O(particles).
+ * A hash of all positions, momenta, masses, normals, velocities of walls, numbers of bodies, and of
+ * how bodies move. It does not depend on the order of rows or on ids: equal scenes added in another order have equal hashes. cost: O(particles).
  */
 ASCC_API uint64_t ascc_particles_hash(const ascc_particles *particles);
 
@@ -464,6 +464,124 @@ typedef struct ascc_measures {
  * untouched. cost: one neighbour search. threads: one at a time, since it leaves its message in the set.
  */
 ASCC_API ascc_status ascc_particles_measure(ascc_particles *particles, ascc_measures *measures);
+
+/* ---- Bodies: solids that have a frame of their own and move as a whole ------------------------ */
+
+/** What a body is made of. Its frame's origin is its middle, its axes are the shape's. */
+typedef enum ascc_shape_kind {
+    ASCC_SHAPE_POINTS = 0, /* points with normals, as given */
+    ASCC_SHAPE_PLANE = 1,  /* |x| <= half[0], |z| <= half[2] at y = 0, seen from +y; in 2D a line */
+    ASCC_SHAPE_BOX = 2,    /* |x| <= half[0] and so on */
+    ASCC_SHAPE_SPHERE = 3, /* of `radius`; in 2D a circle */
+    ASCC_SHAPE_CAPSULE =
+        4, /* around the y axis: straight for |y| <= half[1], then half spheres of `radius` */
+    ASCC_SHAPE_CYLINDER = 5, /* around the y axis, |y| <= half[1]; in 2D a rectangle */
+    ASCC_SHAPE_MESH =
+        6, /* triangles, counterclockwise seen from outside; in 2D lines, outside on the right */
+} ascc_shape_kind;
+
+/** Where the water is. */
+typedef enum ascc_water {
+    ASCC_WATER_OUTSIDE = 0, /* around a solid */
+    ASCC_WATER_INSIDE = 1,  /* in a container. Of a plane: at -y; of points: as their normals say */
+    ASCC_WATER_BOTH = 2,    /* on both sides of a thin sheet: two layers of points, back to back */
+} ascc_water;
+
+/** A surface that becomes boundary points. Lengths in the length unit; zero in every other member is the default. */
+typedef struct ascc_shape {
+    size_t size; /* sizeof(ascc_shape) */
+    ascc_shape_kind kind;
+    ascc_water water;
+    double half[3]; /* half extents, > 0 where the kind has them */
+    double radius;  /* > 0 where the kind has one */
+    double pitch;   /* from point to point at most; 0 = 0.64 particle spacings (docs/walls.md) */
+    double inset;   /* how far behind the surface points lie, seen from the water; 0 = on it */
+    uint32_t
+        open; /* box: bit 2 c = without the face at -half[c], bit 2 c + 1 = without that at +half[c] */
+    int32_t reserved; /* 0, else ARGUMENT */
+    /* POINTS: [count][dimension] each. MESH: position alone, the corners. */
+    size_t count;
+    const ascc_const_array *position, *normal;
+    size_t face_count; /* MESH */
+    const int32_t
+        *faces; /* [face_count][dimension], rows of position. Faces without area give no points */
+} ascc_shape;
+
+/** Where a body is and how it moves. In 2D only the first two of position and velocity, angle and spin[2]. */
+typedef struct ascc_pose {
+    size_t size;        /* sizeof(ascc_pose) */
+    double position[3]; /* of the frame's origin */
+    double rotation
+        [4]; /* 3D: unit quaternion x, y, z, w from the frame's axes to the world's; all zero = none */
+    double angle;       /* 2D: counterclockwise, radians */
+    double velocity[3]; /* of the origin, length unit / s */
+    double spin[3];     /* in the world's axes, rad/s */
+    double
+        jump; /* how far ascc_body_move may put a point from where it is; 0 = a particle spacing, INFINITY =
+                  * anywhere. Only what moves with its velocity pushes fluid out of its way: a jump leaves it behind */
+} ascc_pose;
+
+/**
+ * Adds a body at the end of the boundary.
+ *
+ * shape     read during the call
+ * pose      where its frame is, and how it moves; NULL = the world's frame, at rest
+ * body      receives its number: above all that the set has had, also those of ascc_particles_add_boundary
+ * errors    ARGUMENT (a member out of range; a rotation whose length is not 1; nothing to make points of),
+ *           NOT_FINITE, RANGE (2^26 points and more; a point or its velocity beyond 2^40 spacings; no number
+ *           left), MEMORY; the message names the member; on error nothing was added.
+ * cost      O(points).
+ */
+ASCC_API ascc_status ascc_body_add(ascc_particles *particles, const ascc_shape *shape,
+                                   const ascc_pose *pose, int32_t *body);
+
+/**
+ * Says where a body is when the next step begins, and how it moves from then on. During steps it goes on with this
+ * velocity and spin, exactly: substeps and runs of many steps included. A host with a dynamics of its own calls it
+ * before each run of one step; where the pose is what the body had come to, only the motion changes.
+ *
+ * errors    ARGUMENT (no such body; a rotation whose length is not 1; what the dimension does not have), NOT_FINITE,
+ *           RANGE (a point would jump farther than `jump`, or beyond 2^40 spacings, or as fast a second; an angle
+ *           or spin beyond 10^6); on error nothing has changed.
+ * cost      O(points of the body).
+ */
+ASCC_API ascc_status ascc_body_move(ascc_particles *particles, int32_t body, const ascc_pose *pose);
+
+/** What ascc_body_get tells. */
+typedef struct ascc_body_info {
+    size_t size;         /* sizeof(ascc_body_info) */
+    size_t first, count; /* boundary rows [first, first + count) are its points */
+    double position[3], rotation[4], angle, velocity[3], spin[3]; /* as in ascc_pose */
+} ascc_body_info;
+
+/** Where a body is now. errors: ARGUMENT: no body has this number and a frame. cost: O(log points). */
+ASCC_API ascc_status ascc_body_get(const ascc_particles *particles, int32_t body,
+                                   ascc_body_info *info);
+
+/**
+ * Removes a body and its points. Points of ascc_particles_add_boundary are no body in this sense: they are removed by
+ * id. errors: ARGUMENT (no such body), MEMORY; on error nothing was removed. cost: O(boundary).
+ */
+ASCC_API ascc_status ascc_body_remove(ascc_particles *particles, int32_t body);
+
+/**
+ * The numbers of all bodies, ascending, into bodies[capacity], as many as fit. Returns how many there are. Bodies
+ * whose points were all removed by id are among them; ascc_particles_clear of the boundary drops them all.
+ */
+ASCC_API size_t ascc_bodies_list(const ascc_particles *particles, size_t capacity, int32_t *bodies);
+
+/**
+ * What the last ascc_step_run gave to bodies over all of its steps, in one pass.
+ *
+ * bodies    int32_t[count], none twice
+ * impulse   int64_t[count][3] receives quanta, exact; [2] is 0 in 2D. NULL if not wanted.
+ * torque    double[count][3] receives kg length^2/s, angular impulse about each body's origin, where it was at each
+ *           step; in 2D only [2] is used. NULL if not wanted.
+ * errors    ARGUMENT (no such body), RANGE. cost: O(points of these bodies). All zero before the first run.
+ */
+ASCC_API ascc_status ascc_bodies_impulse(const ascc_particles *particles, size_t count,
+                                         const int32_t *bodies, int64_t (*impulse)[3],
+                                         double (*torque)[3]);
 
 /* ---- Step: a model bound to the scratch memory it needs to advance particles ------------------ */
 
@@ -515,9 +633,10 @@ typedef struct ascc_forces {
 } ascc_forces;
 
 /**
- * Advances the fluid by `count` time steps (docs/method.md). Walls go on with their own velocities, which
- * are taken to be constant all the while: a position of a wall is that at the beginning of a step. Normals
- * stay as they are; what turns or speeds up is set anew before each step, `count` 1.
+ * Advances the fluid by `count` time steps (docs/method.md). Bodies go on with their velocities and spins. So do
+ * other walls with their own velocities, which are taken to be constant all the while, and their normals stay
+ * as they are; what turns there or speeds up is set anew before each step, `count` 1. A position of a wall is
+ * that at the beginning of a step.
  *
  * forces    NULL = the model's gravity alone.
  * errors    ARGUMENT, MISMATCH (dimension; a spacing that is not the model's), MEMORY (scratch had to

@@ -6,7 +6,7 @@
  */
 #include <string.h>
 
-#include "particles.h"
+#include "bodies.h"
 
 /* ---- Rows of the host's numbers -------------------------------------------------------------- */
 
@@ -114,6 +114,8 @@ ascc_status ascc_particles_set(ascc_particles *particles, ascc_kind kind, ascc_f
             "values", values,
             ascc_field_numbers(&ascc_particle_fields[which], particles->dimension), &from,
             &message);
+    if (status == ASCC_OK && kind == ASCC_BOUNDARY)
+        status = ascc_bodies_check_free(particles, first, count, &message);
     if (status == ASCC_OK && count > 0)
         status = set_field(particles, which, first, count, &from, &message);
     return status == ASCC_OK ? status : ascc_particles_fail(particles, status, "%s", message.text);

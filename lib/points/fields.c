@@ -70,6 +70,16 @@ static ascc_status check_normal(const ascc_candidate *row, ascc_message *message
                      row->row, sqrt(square));
 }
 
+/* Of a point without a frame all zeros. */
+static ascc_status check_own_normal(const ascc_candidate *row, ascc_message *message)
+{
+    const double *const normal = row->values;
+    for (int32_t c = 0; c < row->numbers; c++)
+        if (normal[c] != 0)
+            return check_normal(row, message);
+    return ASCC_OK;
+}
+
 static ascc_status check_velocity(const ascc_candidate *row, ascc_message *message)
 {
     const double *const velocity = row->values;

@@ -140,6 +140,17 @@ ascc_status ascc_particles_total_momentum(const ascc_particles *particles, int64
     return ASCC_OK;
 }
 
+bool ascc_wall_impulse_sum(const ascc_particles *particles, size_t first, size_t count,
+                           int64_t impulse[3])
+{
+    const size_t d = ascc_particles_width(particles);
+    wide_sum sum[3] = {{0, 0}, {0, 0}, {0, 0}};
+    for (size_t row = first; row < first + count; row++)
+        for (size_t c = 0; c < d; c++)
+            add_wide(&sum[c], particles->wall_impulse[row * d + c]);
+    return narrow_all(sum, impulse);
+}
+
 /* torque += (x - point) cross the impulse of a boundary row. */
 static void add_torque(const ascc_particles *particles, size_t row, const double point[3],
                        double torque[3])

@@ -2,6 +2,8 @@
  * SPDX-License-Identifier: MIT */
 #include "particles.h"
 
+#include "bodies.h"
+
 #include <stdio.h>
 #include <string.h>
 
@@ -164,6 +166,7 @@ void ascc_particles_destroy(ascc_particles **particles)
     *particles = NULL;
     ascc_context *const context = old->context;
     ascc_particles_release_rows(old);
+    ascc_release(&context->allocator, old->bodies, old->body_capacity, sizeof *old->bodies);
     old->magic = 0;
     ascc_release(&context->allocator, old, 1, sizeof *old);
     ascc_context_release(context);
@@ -188,23 +191,24 @@ static size_t grown_capacity(size_t capacity, size_t count)
     return count <= capacity ? capacity : ascc_max_size(count, capacity + capacity / 2);
 }
 
-static ascc_status fail_memory(ascc_particles *particles, size_t count, const char *kind)
+static ascc_status fail_memory(ascc_message *message, size_t count, const char *kind)
 {
-    return ascc_particles_fail(particles, ASCC_ERROR_MEMORY,
-                               "out of memory for %zu more %s particles", count, kind);
+    return ascc_fail(message, ASCC_ERROR_MEMORY, "out of memory for %zu more %s particles", count,
+                     kind);
 }
 
 /* Whether that many rows more can be in any memory and have ids; asked before the host's arrays are
  * read. */
-static ascc_status check_count(ascc_particles *particles, ascc_kind kind, size_t count)
+static ascc_status check_count(const ascc_particles *particles, ascc_kind kind, size_t count,
+                               ascc_message *message)
 {
     const size_t rows = ascc_particles_count(particles, kind);
     if (count > SIZE_MAX - rows || !ascc_particles_can_hold(particles, kind, rows + count))
-        return fail_memory(particles, count, kind == ASCC_FLUID ? "fluid" : "boundary");
+        return fail_memory(message, count, kind == ASCC_FLUID ? "fluid" : "boundary");
     if (count > ASCC_ID_LIMIT - particles->next_id)
-        return ascc_particles_fail(particles, ASCC_ERROR_RANGE,
-                                   "ids: the next is %llu, and %zu more would go beyond 2^63",
-                                   (unsigned long long)particles->next_id, count);
+        return ascc_fail(message, ASCC_ERROR_RANGE,
+                         "ids: the next is %llu, and %zu more would go beyond 2^63",
+                         (unsigned long long)particles->next_id, count);
     return ASCC_OK;
 }
 
@@ -246,26 +250,20 @@ static ascc_status open_fluid(const ascc_particles *particles, size_t count,
     return status;
 }
 
-ascc_status ascc_particles_add_fluid(ascc_particles *particles, size_t count,
-                                     const ascc_const_array *position,
-                                     const ascc_const_array *velocity, const ascc_const_array *mass,
-                                     uint64_t *ids)
+static ascc_status add_fluid(ascc_particles *particles, size_t count,
+                             const ascc_const_array *position, const ascc_const_array *velocity,
+                             const ascc_const_array *mass, uint64_t *ids, ascc_message *message)
 {
-    ASCC_FLOAT_SCOPE;
-    if (!ascc_particles_is_set(particles))
-        return ASCC_ERROR_ARGUMENT;
-    ascc_status status = check_count(particles, ASCC_FLUID, count);
+    new_fluid from;
+    ascc_status status = check_count(particles, ASCC_FLUID, count, message);
+    if (status == ASCC_OK && count > 0)
+        status = open_fluid(particles, count, position, velocity, mass, &from, message);
     if (status != ASCC_OK || count == 0)
         return status;
-    new_fluid from;
-    ascc_message message;
-    status = open_fluid(particles, count, position, velocity, mass, &from, &message);
-    if (status != ASCC_OK)
-        return ascc_particles_fail(particles, status, "%s", message.text);
     const size_t first = particles->fluid_count;
     if (!ascc_particles_make_room(particles,
                                   grown_capacity(particles->fluid_capacity, first + count), 0))
-        return fail_memory(particles, count, "fluid");
+        return fail_memory(message, count, "fluid");
 
     ascc_particles_zero_rows(particles, ASCC_FLUID, first, count);
     ascc_field_store(particles, ASCC_FIELD_position, &from.position, first, count);
@@ -276,6 +274,76 @@ ascc_status ascc_particles_add_fluid(ascc_particles *particles, size_t count,
     return ASCC_OK;
 }
 
+ascc_status ascc_particles_add_fluid(ascc_particles *particles, size_t count,
+                                     const ascc_const_array *position,
+                                     const ascc_const_array *velocity, const ascc_const_array *mass,
+                                     uint64_t *ids)
+{
+    ASCC_FLOAT_SCOPE;
+    if (!ascc_particles_is_set(particles))
+        return ASCC_ERROR_ARGUMENT;
+    ascc_message message;
+    const ascc_status status = add_fluid(particles, count, position, velocity, mass, ids, &message);
+    return status == ASCC_OK ? status : ascc_particles_fail(particles, status, "%s", message.text);
+}
+
+ascc_status ascc_particles_append_walls(ascc_particles *particles, size_t count, int32_t body,
+                                        size_t *first, ascc_message *message)
+{
+    *first = particles->boundary_count;
+    const ascc_status status = check_count(particles, ASCC_BOUNDARY, count, message);
+    if (status != ASCC_OK)
+        return status;
+    if (!ascc_particles_make_room(particles, 0,
+                                  grown_capacity(particles->boundary_capacity, *first + count)))
+        return fail_memory(message, count, "boundary");
+    ascc_particles_zero_rows(particles, ASCC_BOUNDARY, *first, count);
+    for (size_t row = *first; row < *first + count; row++)
+        particles->wall_body[row] = body;
+    give_ids(particles, particles->wall_id, *first, count, NULL);
+    particles->boundary_count += count;
+    if (body >= particles->next_body)
+        particles->next_body = (int64_t)body + 1;
+    return ASCC_OK;
+}
+
+static ascc_status add_boundary(ascc_particles *particles, size_t count,
+                                const ascc_const_array *position, const ascc_const_array *normal,
+                                int32_t body, uint64_t *ids, ascc_message *message)
+{
+    ascc_status status = check_count(particles, ASCC_BOUNDARY, count, message);
+    if (status != ASCC_OK)
+        return status;
+    if (body < 0)
+        return ascc_fail(message, ASCC_ERROR_ARGUMENT, "body: %ld is negative", (long)body);
+    if (ascc_bodies_find(particles, body) != NULL)
+        return ascc_fail(message, ASCC_ERROR_ARGUMENT,
+                         "body: %ld is one of ascc_body_add, whose points come with it",
+                         (long)body);
+    if (count == 0)
+        return ASCC_OK;
+
+    const int32_t d = particles->dimension;
+    ascc_host_array positions, normals;
+    size_t first;
+    status = ascc_host_array_open("position", position, d, &positions, message);
+    if (status == ASCC_OK)
+        status = ascc_host_array_open("normal", normal, d, &normals, message);
+    if (status == ASCC_OK)
+        status = ascc_field_check(particles, ASCC_FIELD_wall_position, &positions, count, message);
+    if (status == ASCC_OK)
+        status = ascc_field_check(particles, ASCC_FIELD_wall_normal, &normals, count, message);
+    if (status == ASCC_OK)
+        status = ascc_particles_append_walls(particles, count, body, &first, message);
+    if (status != ASCC_OK)
+        return status;
+    ascc_field_store(particles, ASCC_FIELD_wall_position, &positions, first, count);
+    ascc_field_store(particles, ASCC_FIELD_wall_normal, &normals, first, count);
+    if (ids != NULL)
+        memcpy(ids, particles->wall_id + first, count * sizeof *ids);
+    return ASCC_OK;
+}
+
 ascc_status ascc_particles_add_boundary(ascc_particles *particles, size_t count,
                                         const ascc_const_array *position,
                                         const ascc_const_array *normal, int32_t body, uint64_t *ids)
@@ -283,39 +351,25 @@ ascc_status ascc_particles_add_boundary(ascc_particles *particles, size_t count,
     ASCC_FLOAT_SCOPE;
     if (!ascc_particles_is_set(particles))
         return ASCC_ERROR_ARGUMENT;
-    ascc_status status = check_count(particles, ASCC_BOUNDARY, count);
+    ascc_message message;
+    const ascc_status status =
+        add_boundary(particles, count, position, normal, body, ids, &message);
+    return status == ASCC_OK ? status : ascc_particles_fail(particles, status, "%s", message.text);
+}
+
+static ascc_status add_resting(ascc_particles *particles, size_t count, ascc_message *message)
+{
+    const size_t first = particles->fluid_count, added = count - first;
+    const ascc_status status = check_count(particles, ASCC_FLUID, added, message);
     if (status != ASCC_OK)
         return status;
-    if (body < 0)
-        return ascc_particles_fail(particles, ASCC_ERROR_ARGUMENT, "body: %ld is negative",
-                                   (long)body);
-    if (count == 0)
-        return ASCC_OK;
-
-    const int32_t d = particles->dimension;
-    ascc_host_array positions, normals;
-    ascc_message message;
-    status = ascc_host_array_open("position", position, d, &positions, &message);
-    if (status == ASCC_OK)
-        status = ascc_host_array_open("normal", normal, d, &normals, &message);
-    if (status == ASCC_OK)
-        status = ascc_field_check(particles, ASCC_FIELD_wall_position, &positions, count, &message);
-    if (status == ASCC_OK)
-        status = ascc_field_check(particles, ASCC_FIELD_wall_normal, &normals, count, &message);
-    if (status != ASCC_OK)
-        return ascc_particles_fail(particles, status, "%s", message.text);
-    const size_t first = particles->boundary_count;
-    if (!ascc_particles_make_room(particles, 0,
-                                  grown_capacity(particles->boundary_capacity, first + count)))
-        return fail_memory(particles, count, "boundary");
-
-    ascc_particles_zero_rows(particles, ASCC_BOUNDARY, first, count);
-    ascc_field_store(particles, ASCC_FIELD_wall_position, &positions, first, count);
-    ascc_field_store(particles, ASCC_FIELD_wall_normal, &normals, first, count);
-    for (size_t row = first; row < first + count; row++)
-        particles->wall_body[row] = body;
-    give_ids(particles, particles->wall_id, first, count, ids);
-    particles->boundary_count += count;
+    if (!ascc_particles_make_room(particles, grown_capacity(particles->fluid_capacity, count), 0))
+        return fail_memory(message, added, "fluid");
+    const ascc_host_array mass = ascc_host_array_repeat("mass", &particles->default_mass);
+    ascc_particles_zero_rows(particles, ASCC_FLUID, first, added);
+    ascc_field_store(particles, ASCC_FIELD_mass, &mass, first, added);
+    give_ids(particles, particles->id, first, added, NULL);
+    particles->fluid_count = count;
     return ASCC_OK;
 }
 
@@ -328,18 +382,9 @@ ascc_status ascc_particles_resize_fluid(ascc_particles *particles, size_t count)
         particles->fluid_count = count;
         return ASCC_OK;
     }
-    const size_t first = particles->fluid_count, added = count - first;
-    const ascc_status status = check_count(particles, ASCC_FLUID, added);
-    if (status != ASCC_OK)
-        return status;
-    if (!ascc_particles_make_room(particles, grown_capacity(particles->fluid_capacity, count), 0))
-        return fail_memory(particles, added, "fluid");
-    const ascc_host_array mass = ascc_host_array_repeat("mass", &particles->default_mass);
-    ascc_particles_zero_rows(particles, ASCC_FLUID, first, added);
-    ascc_field_store(particles, ASCC_FIELD_mass, &mass, first, added);
-    give_ids(particles, particles->id, first, added, NULL);
-    particles->fluid_count = count;
-    return ASCC_OK;
+    ascc_message message;
+    const ascc_status status = add_resting(particles, count, &message);
+    return status == ASCC_OK ? status : ascc_particles_fail(particles, status, "%s", message.text);
 }
 
 /* ---- Removing -------------------------------------------------------------------------------- */
@@ -399,7 +444,7 @@ ascc_status ascc_particles_clear(ascc_particles *particles, ascc_kind kind)
     if (kind == ASCC_FLUID)
         particles->fluid_count = 0;
     else if (kind == ASCC_BOUNDARY)
-        particles->boundary_count = 0;
+        particles->boundary_count = particles->body_count = 0;
     else
         return ascc_particles_fail(particles, ASCC_ERROR_ARGUMENT,
                                    "kind: %d is neither fluid nor boundary", (int)kind);

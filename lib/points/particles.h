@@ -29,6 +29,11 @@ struct ascc_particles {
     ASCC_PARTICLE_FIELDS(ASCC_MEMBER)
 #undef ASCC_MEMBER
 
+    /* Bodies in order of their numbers (bodies.h). */
+    struct ascc_body *bodies;
+    size_t body_count, body_capacity;
+    int64_t next_body; /* above all numbers that the set has had */
+
     ascc_message message; /* of the last failed call that changes the set */
 };
 
@@ -88,6 +93,10 @@ ascc_status ascc_particles_fail(ascc_particles *particles, ascc_status status, c
 ascc_status ascc_particles_fail_reading(const ascc_particles *particles, ascc_status status,
                                         const char *format, ...) ASCC_PRINTF(3, 4);
 
+/* Adds boundary rows of a body, all zeros but for ids and number; nothing can fail after it. errors: MEMORY, RANGE. */
+ascc_status ascc_particles_append_walls(ascc_particles *particles, size_t count, int32_t body,
+                                        size_t *first, ascc_message *message);
+
 /* ---- storage.c: the memory of the fields ---- */
 
 /* Makes room for exactly these counts where there is less. False and unchanged without memory. */
@@ -132,6 +141,11 @@ ascc_status ascc_velocity_check(const ascc_particles *particles, const ascc_host
                                 const ascc_host_array *mass, size_t count, ascc_message *message);
 void ascc_velocity_store(ascc_particles *particles, const ascc_host_array *from, size_t first,
                          size_t count);
+
+/* What boundary rows [first, first + count) received, quanta, exact. False, and nothing written, where it does not
+ * fit. */
+bool ascc_wall_impulse_sum(const ascc_particles *particles, size_t first, size_t count,
+                           int64_t impulse[3]);
 
 /* Masses of rows [first, first + count), which keep their velocities. */
 ascc_status ascc_new_mass_check(const ascc_particles *particles, const ascc_host_array *from,

@@ -1,5 +1,6 @@
 /* Snapshot, restore and hash of a particle set. SPDX-License-Identifier: MIT */
-#include "particles.h"
+#include "bodies.h"
+#include "rotation.h"
 
 #include <inttypes.h>
 #include <math.h>
@@ -12,11 +13,15 @@
  *
  *   magic, version, dimension, fluid count, boundary count, next id, spacing, mass, quantum,
  *   every field of the list in fields.h that the version has, row by row,
+ *   from version 3 on every body (number, whether it moved, first id, end of ids, its doubles in the order of
+ *   bodies.h), the next body's number, the number of bodies,
  *   checksum of all before
  */
 #define SNAPSHOT_MAGIC UINT64_C(0x50414e5343435341) /* the bytes "ASCCSNAP" */
 #define SNAPSHOT_HEADER 9
 #define SNAPSHOT_FRAME (SNAPSHOT_HEADER + 1) /* and the checksum */
+#define BODY_WORDS (4 + ASCC_BODY_NUMBERS)
+#define BODIES_FRAME 2 /* after the bodies, from version 3 on */
 
 /* Words of one particle of a kind, in a snapshot with the first `fields` of the list. */
 static size_t row_words(ascc_kind kind, int32_t dimension, size_t fields)
@@ -72,7 +77,8 @@ static size_t snapshot_words(const ascc_particles *particles)
     const int32_t dimension = particles->dimension;
     return SNAPSHOT_FRAME +
            particles->fluid_count * row_words(ASCC_FLUID, dimension, ASCC_FIELD_COUNT) +
-           particles->boundary_count * row_words(ASCC_BOUNDARY, dimension, ASCC_FIELD_COUNT);
+           particles->boundary_count * row_words(ASCC_BOUNDARY, dimension, ASCC_FIELD_COUNT) +
+           particles->body_count * BODY_WORDS + BODIES_FRAME;
 }
 
 size_t ascc_particles_snapshot_size(const ascc_particles *particles)
@@ -113,6 +119,23 @@ static unsigned char *put(unsigned char *into, uint64_t word)
     return into + 8;
 }
 
+static unsigned char *put_body(unsigned char *into, const struct ascc_body *body)
+{
+    into = put(into, (uint64_t)body->number);
+    into = put(into, (uint64_t)body->moved);
+    into = put(into, body->first_id);
+    into = put(into, body->end_id);
+    for (size_t k = 0; k < ASCC_BODY_NUMBERS; k++) {
+        double number;
+        memcpy(&number,
+               (const unsigned char *)body + offsetof(struct ascc_body, position) +
+                   k * sizeof number,
+               sizeof number);
+        into = put(into, bits_of(number));
+    }
+    return into;
+}
+
 ascc_status ascc_particles_snapshot(const ascc_particles *particles, void *memory, size_t capacity)
 {
     ASCC_FLOAT_SCOPE;
@@ -141,6 +164,10 @@ ascc_status ascc_particles_snapshot(const ascc_particles *particles, void *memor
         for (size_t k = 0; k < count; k++)
             at = put(at, number_word(field, numbers, k));
     }
+    for (size_t b = 0; b < particles->body_count; b++)
+        at = put_body(at, &particles->bodies[b]);
+    at = put(at, (uint64_t)particles->next_body);
+    at = put(at, particles->body_count);
     put(at, checksum(memory, (size_t)(at - (unsigned char *)memory) / 8));
     return ASCC_OK;
 }
@@ -155,6 +182,9 @@ typedef struct snapshot {
     uint64_t next_id;
     double spacing, mass, quantum;
     const unsigned char *words[ASCC_FIELD_COUNT]; /* where each field begins */
+    size_t body_count;
+    int64_t next_body;
+    const unsigned char *bodies;
 } snapshot;
 
 /* Reads header and sizes of untrusted bytes. On failure *why says what is wrong. */
@@ -176,7 +206,19 @@ static bool open_snapshot(const unsigned char *bytes, size_t size, snapshot *fro
     const uint64_t fluid = get_word(bytes + 24), boundary = get_word(bytes + 32);
     if (dimension != 2 && dimension != 3)
         return false;
-    const size_t words = size / 8 - SNAPSHOT_FRAME;
+    const unsigned char *const end = bytes + size - 8;
+    size_t words = size / 8 - SNAPSHOT_FRAME;
+    uint64_t bodies = 0, next_body = 0;
+    if (fields == ASCC_FIELD_COUNT) {
+        if (words < BODIES_FRAME)
+            return false;
+        words -= BODIES_FRAME;
+        bodies = get_word(end - 8);
+        next_body = get_word(end - 16);
+        if (bodies > words / BODY_WORDS || next_body > (uint64_t)INT32_MAX + 1)
+            return false;
+        words -= (size_t)bodies * BODY_WORDS;
+    }
     const size_t fluid_words = row_words(ASCC_FLUID, (int32_t)dimension, fields);
     const size_t boundary_words = row_words(ASCC_BOUNDARY, (int32_t)dimension, fields);
     if (fluid > words / fluid_words || boundary > words / boundary_words ||
@@ -189,7 +231,10 @@ static bool open_snapshot(const unsigned char *bytes, size_t size, snapshot *fro
                        .next_id = get_word(bytes + 40),
                        .spacing = double_of(get_word(bytes + 48)),
                        .mass = double_of(get_word(bytes + 56)),
-                       .quantum = double_of(get_word(bytes + 64))};
+                       .quantum = double_of(get_word(bytes + 64)),
+                       .body_count = (size_t)bodies,
+                       .next_body = (int64_t)next_body,
+                       .bodies = end - 8 * (BODIES_FRAME + (size_t)bodies * BODY_WORDS)};
     const unsigned char *at = bytes + 8 * SNAPSHOT_HEADER;
     for (size_t i = 0; i < fields; i++) {
         const ascc_particle_field *const field = &ascc_particle_fields[i];
@@ -250,6 +295,97 @@ static bool are_ids(const snapshot *from)
     return from->next_id > 0 && from->next_id <= ASCC_ID_LIMIT;
 }
 
+static struct ascc_body get_body(const snapshot *from, size_t index)
+{
+    const unsigned char *at = from->bodies + 8 * BODY_WORDS * index;
+    struct ascc_body body = {.number = (int32_t)get_word(at),
+                             .moved = (int32_t)(get_word(at + 8) & 1),
+                             .first_id = get_word(at + 16),
+                             .end_id = get_word(at + 24)};
+    for (size_t k = 0; k < ASCC_BODY_NUMBERS; k++) {
+        const double number = double_of(get_word(at + 32 + 8 * k));
+        memcpy((unsigned char *)&body + offsetof(struct ascc_body, position) + k * sizeof number,
+               &number, sizeof number);
+    }
+    return body;
+}
+
+/* Bodies ascend in numbers and ids. */
+static ascc_status check_bodies(const snapshot *from, ascc_message *message)
+{
+    int64_t number = -1;
+    uint64_t id = 0;
+    for (size_t b = 0; b < from->body_count; b++) {
+        struct ascc_body body = get_body(from, b);
+        const unsigned char *const at = from->bodies + 8 * BODY_WORDS * b;
+        if (get_word(at) > INT32_MAX || get_word(at + 8) > 1 || body.number <= number ||
+            body.number >= from->next_body || body.first_id < id || body.end_id < body.first_id ||
+            body.end_id > from->next_id)
+            return ascc_fail(message, ASCC_ERROR_FORMAT, "body %zu of %zu has impossible numbers",
+                             b, from->body_count);
+        for (int c = 0; c < 3; c++)
+            if (!isfinite(body.torque[c]))
+                return ascc_fail(message, ASCC_ERROR_FORMAT, "a body's torque is not finite");
+        if (ascc_body_check(&body, from->dimension, from->spacing, "a body", message) != ASCC_OK)
+            return ASCC_ERROR_FORMAT;
+        number = body.number;
+        id = body.end_id;
+    }
+    return ASCC_OK;
+}
+
+/* The body whose points have an id, or -1. Ids are asked in ascending order: `next` is where to look. */
+static int64_t body_of_id(const snapshot *from, uint64_t id, size_t *next)
+{
+    while (*next < from->body_count) {
+        const struct ascc_body body = get_body(from, *next);
+        if (id < body.end_id)
+            return id >= body.first_id ? body.number : -1;
+        ++*next;
+    }
+    return -1;
+}
+
+static bool is_body_number(const snapshot *from, uint64_t number)
+{
+    size_t low = 0, high = from->body_count;
+    while (low < high) {
+        const size_t middle = low + (high - low) / 2;
+        const uint64_t found = get_word(from->bodies + 8 * BODY_WORDS * middle);
+        if (found == number)
+            return true;
+        if (found < number)
+            low = middle + 1;
+        else
+            high = middle;
+    }
+    return false;
+}
+
+/* Points are a body's by id and by number, and have a normal in its frame. Old snapshots have no bodies. */
+static ascc_status check_points_of_bodies(const snapshot *from, ascc_message *message)
+{
+    const size_t d = (size_t)from->dimension;
+    size_t next = 0;
+    if (from->fields < ASCC_FIELD_COUNT)
+        return ASCC_OK;
+    for (size_t row = 0; row < from->rows[ASCC_BOUNDARY]; row++) {
+        const uint64_t number = get_word(from->words[ASCC_FIELD_wall_body] + 8 * row);
+        const uint64_t id = get_word(from->words[ASCC_FIELD_wall_id] + 8 * row);
+        const int64_t body = body_of_id(from, id, &next);
+        const unsigned char *const own = from->words[ASCC_FIELD_wall_own_normal] + 8 * row * d;
+        bool has_normal = false;
+        for (size_t c = 0; c < d; c++)
+            has_normal |= double_of(get_word(own + 8 * c)) != 0;
+        if ((int64_t)number >= from->next_body ||
+            (body >= 0 ? number != (uint64_t)body || !has_normal : is_body_number(from, number)))
+            return ascc_fail(message, ASCC_ERROR_FORMAT,
+                             "wall_body: row %zu is %llu, which its id contradicts", row,
+                             (unsigned long long)number);
+    }
+    return ASCC_OK;
+}
+
 /* Whether a set can be this. */
 static ascc_status check_snapshot(const snapshot *from, ascc_message *message)
 {
@@ -264,7 +400,21 @@ static ascc_status check_snapshot(const snapshot *from, ascc_message *message)
     if (!are_ids(from))
         return ascc_fail(message, ASCC_ERROR_FORMAT, "impossible ids; the next is %" PRIu64,
                          from->next_id);
-    return ASCC_OK;
+    const ascc_status status = check_bodies(from, message);
+    return status == ASCC_OK ? check_points_of_bodies(from, message) : status;
+}
+
+static void become_bodies(ascc_particles *particles, const snapshot *from)
+{
+    for (size_t b = 0; b < from->body_count; b++) {
+        particles->bodies[b] = get_body(from, b);
+        (void)ascc_rotation_normalize(particles->bodies[b].rotation);
+    }
+    particles->body_count = from->body_count;
+    particles->next_body = from->next_body;
+    for (size_t row = 0; row < particles->boundary_count; row++) /* old snapshots do not say */
+        if (particles->wall_body[row] >= particles->next_body)
+            particles->next_body = (int64_t)particles->wall_body[row] + 1;
 }
 
 static void become(ascc_particles *particles, const snapshot *from)
@@ -285,6 +435,7 @@ static void become(ascc_particles *particles, const snapshot *from)
         for (size_t k = 0; k < count; k++)
             (void)number_from_word(field, numbers, k, get_word(from->words[i] + 8 * k));
     }
+    become_bodies(particles, from);
 }
 
 ascc_status ascc_particles_restore(ascc_particles *particles, const void *memory, size_t size)
@@ -306,6 +457,11 @@ ascc_status ascc_particles_restore(ascc_particles *particles, const void *memory
     if (check_snapshot(&from, &message) != ASCC_OK)
         return ascc_particles_fail(particles, ASCC_ERROR_FORMAT, "memory: %s", message.text);
     const size_t fluid = from.rows[ASCC_FLUID], boundary = from.rows[ASCC_BOUNDARY];
+    if (from.body_count > 0 &&
+        !ascc_grow(&particles->context->allocator, (void **)&particles->bodies,
+                   &particles->body_capacity, from.body_count, sizeof *particles->bodies))
+        return ascc_particles_fail(particles, ASCC_ERROR_MEMORY, "out of memory for %zu bodies",
+                                   from.body_count);
     if (!ascc_particles_make_room(particles, fluid, boundary))
         return ascc_particles_fail(particles, ASCC_ERROR_MEMORY,
                                    "out of memory for %zu fluid and %zu boundary particles", fluid,
@@ -358,6 +514,26 @@ static uint64_t sum_rows(const ascc_particles *particles, ascc_kind kind)
     return sum;
 }
 
+/* Likewise over bodies: nothing without any. */
+static uint64_t sum_bodies(const ascc_particles *particles)
+{
+    uint64_t sum = 0;
+    for (size_t b = 0; b < particles->body_count; b++) {
+        const struct ascc_body *const body = &particles->bodies[b];
+        uint64_t one = mix(0, ASCC_KIND_COUNT);
+        one = mix(one, (uint64_t)body->number);
+        for (int c = 0; c < 3; c++) {
+            one = mix(one, bits_of(body->position[c] + 0.0));
+            one = mix(one, bits_of(body->velocity[c] + 0.0));
+            one = mix(one, bits_of(body->spin[c] + 0.0));
+        }
+        for (int c = 0; c < 4; c++)
+            one = mix(one, bits_of(body->rotation[c] + 0.0));
+        sum += mix(one, bits_of(body->angle + 0.0));
+    }
+    return sum;
+}
+
 uint64_t ascc_particles_hash(const ascc_particles *particles)
 {
     ASCC_FLOAT_SCOPE;
@@ -367,5 +543,6 @@ uint64_t ascc_particles_hash(const ascc_particles *particles)
     hash = mix(hash, particles->fluid_count);
     hash = mix(hash, particles->boundary_count);
     hash = mix(hash, bits_of(particles->quantum));
-    return hash + sum_rows(particles, ASCC_FLUID) + sum_rows(particles, ASCC_BOUNDARY);
+    return hash + sum_rows(particles, ASCC_FLUID) + sum_rows(particles, ASCC_BOUNDARY) +
+           sum_bodies(particles);
 }

@@ -5,7 +5,7 @@
  * or fails as a whole:
  *
  *     fluid     | position | momentum | mass | id |
- *     boundary  | position | normal   | impulse | id | body | velocity |
+ *     boundary  | position | normal   | impulse | id | body | velocity | own position | own normal |
  */
 #include <string.h>
 

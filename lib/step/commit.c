@@ -4,6 +4,8 @@
 
 #include <string.h>
 
+#include "points/bodies.h"
+
 /* Sums for the statistics: they wrap instead of failing. */
 typedef struct totals_job {
     const int64_t *rows;
@@ -72,6 +74,33 @@ static void commit_rows(void *data, size_t begin, size_t end, int32_t slot)
            n * sizeof(int64_t));
 }
 
+/* Angular impulses of bodies that move, while they are where the step began; `wall` is what rows received since the run
+ * began. */
+static void add_torques(ascc_particles *p, const int64_t *wall, bool first)
+{
+    for (size_t b = 0; b < p->body_count; b++) {
+        struct ascc_body *body = &p->bodies[b];
+        if (first) {
+            body->moved = ascc_body_moves(body);
+            memset(body->torque, 0, sizeof body->torque);
+        }
+        if (body->moved)
+            ascc_body_add_torque(p, body, wall, first ? NULL : p->wall_impulse);
+    }
+}
+
+/* Frames go on, and with them what their points have but positions, which the step has found. */
+static void move_bodies(ascc_particles *p, double seconds)
+{
+    for (size_t b = 0; b < p->body_count; b++) {
+        struct ascc_body *body = &p->bodies[b];
+        if (!ascc_body_moves(body))
+            continue;
+        (void)ascc_body_advance(p, body, seconds);
+        ascc_body_place(p, body, p->wall_position, p->wall_normal, p->wall_velocity);
+    }
+}
+
 ascc_status ascc_stage_commit(ascc_step_state *state, ascc_particles *p, bool first)
 {
     ascc_workers *workers = state->tools.workers;
@@ -87,9 +116,11 @@ ascc_status ascc_stage_commit(ascc_step_state *state, ascc_particles *p, bool fi
         return status;
     commit_job job = {p, &state->advance};
     ascc_workers_run(workers, n, 8192, commit_rows, &job);
-    if (walls)
-        memcpy(p->wall_impulse, state->impulses.wall, walls * d * sizeof(int64_t));
+    add_torques(p, state->impulses.wall, first);
     if (state->advance.walls_move)
         memcpy(p->wall_position, state->advance.wall, walls * d * sizeof(double));
+    move_bodies(p, state->motion->time_step);
+    if (walls)
+        memcpy(p->wall_impulse, state->impulses.wall, walls * d * sizeof(int64_t));
     return ASCC_OK;
 }

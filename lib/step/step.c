@@ -8,6 +8,7 @@
 #include "base/host_array.h"
 #include "commit.h"
 #include "estimate.h"
+#include "points/bodies.h"
 
 #define DEFAULT_MAX_NEIGHBORS 4096
 #define DEFAULT_DISPLACEMENT 64.0 /* spacings a step */
@@ -307,7 +308,7 @@ typedef struct kept_field {
     size_t size;
 } kept_field;
 
-#define KEPT_FIELDS 4
+#define KEPT_FIELDS 7
 
 static size_t find_kept(const ascc_particles *p, kept_field field[KEPT_FIELDS])
 {
@@ -317,7 +318,10 @@ static size_t find_kept(const ascc_particles *p, kept_field field[KEPT_FIELDS])
     field[1] = (kept_field){p->momentum, n};
     field[2] = (kept_field){p->wall_impulse, w};
     field[3] = (kept_field){p->wall_position, w};
-    return 2 * n + 2 * w;
+    field[4] = (kept_field){p->wall_normal, w};
+    field[5] = (kept_field){p->wall_velocity, w};
+    field[6] = (kept_field){p->bodies, p->body_count * sizeof *p->bodies};
+    return 2 * n + 4 * w + field[6].size;
 }
 
 static bool keep(ascc_step *step, const ascc_particles *p)

@@ -1,6 +1,7 @@
-/* Where walls end: each point goes on with its own velocity. SPDX-License-Identifier: MIT */
+/* Where walls end: each point goes on with its own velocity, or with its body. SPDX-License-Identifier: MIT */
 #include <math.h>
 
+#include "points/bodies.h"
 #include "stage.h"
 
 typedef struct motion_job {
@@ -57,6 +58,23 @@ static void move_rows(void *data, size_t begin, size_t end, int32_t slot)
         }
 }
 
+/* Points of bodies end where their frames do, so that what turns does not grow. to: NULL = only checks. */
+static ascc_status place_bodies(const ascc_step_state *state, double *to)
+{
+    const ascc_particles *p = state->particles;
+    for (size_t b = 0; b < p->body_count; b++) {
+        struct ascc_body body = p->bodies[b];
+        if (!ascc_body_moves(&body))
+            continue;
+        if (!ascc_body_advance(p, &body, state->motion->time_step))
+            return ascc_fail(state->tools.message, ASCC_ERROR_RANGE,
+                             "body %ld moves or turns beyond what can be held", (long)body.number);
+        if (to != NULL)
+            ascc_body_place(p, &body, to, NULL, NULL);
+    }
+    return ASCC_OK;
+}
+
 ascc_status ascc_stage_wall_motion(ascc_step_state *state)
 {
     const ascc_particles *p = state->particles;
@@ -66,12 +84,12 @@ ascc_status ascc_stage_wall_motion(ascc_step_state *state)
     state->advance.wall = p->wall_position;
     state->advance.walls_move = atomic_load(&job.moves);
     if (!state->advance.walls_move)
-        return ASCC_OK;
+        return place_bodies(state, NULL);
     job.to = ascc_arena_take(state->tools.arena, count * (size_t)p->dimension, sizeof *job.to);
     if (!job.to)
         return ascc_fail(state->tools.message, ASCC_ERROR_MEMORY, "no memory for %zu walls", count);
     ascc_workers_run(state->tools.workers, count, 4096, move_rows, &job);
     state->advance.wall = job.to;
     const size_t bad = atomic_load(&job.bad); /* says once more why */
-    return bad ? move_row(&job, bad - 1, state->tools.message) : ASCC_OK;
+    return bad ? move_row(&job, bad - 1, state->tools.message) : place_bodies(state, job.to);
 }

@@ -14,7 +14,7 @@
 #include "fuzz.h"
 #include "support/model_builder.h"
 
-enum { HEADER = 9, MODELS = 4, MOST = 400 /* particles that are stepped */ };
+enum { HEADER = 9, BODY_WORDS = 21, MODELS = 4, MOST = 400 /* particles that are stepped */ };
 
 static void put(unsigned char *bytes, size_t word, uint64_t value)
 {
@@ -47,14 +47,15 @@ static unsigned char *complete(const uint8_t *data, size_t size, size_t *made)
     const size_t d = 2 + (fuzz_take(&in, 1) & 1);
     const uint64_t share = fuzz_take(&in, 1);
     const size_t head = 4, given = in.left / 8, body = given > head ? given - head : 0;
-    const size_t fluid_words = 2 * d + 2, wall_words = 4 * d + 2;
+    const size_t fluid_words = 2 * d + 2, wall_words = 6 * d + 2;
     const size_t walls = body * (size_t)share / 256 / wall_words;
     const size_t fluid = (body - walls * wall_words) / fluid_words;
-    const size_t words = HEADER + fluid * fluid_words + walls * wall_words + 1;
+    const size_t rows = HEADER + fluid * fluid_words + walls * wall_words;
+    const size_t bodies = walls & 1, words = rows + bodies * BODY_WORDS + 3;
     unsigned char *bytes = calloc(words, 8);
     fuzz_require(bytes != NULL);
     put(bytes, 0, UINT64_C(0x50414e5343435341));
-    put(bytes, 1, 2);
+    put(bytes, 1, 3);
     put(bytes, 2, d);
     put(bytes, 3, fluid);
     put(bytes, 4, walls);
@@ -66,6 +67,16 @@ static unsigned char *complete(const uint8_t *data, size_t size, size_t *made)
         put(bytes, fluid_ids + i, i + 1);
     for (size_t i = 0; i < walls; i++)
         put(bytes, wall_ids + i, fluid + i + 1);
+    for (size_t i = 0; i < walls * bodies; i++) /* all of one body */
+        put(bytes, wall_ids + walls + i, 0);
+    if (bodies) {
+        put(bytes, rows, 0);
+        put(bytes, rows + 1, get(bytes, rows + 1) & 1);
+        put(bytes, rows + 2, fluid + 1);
+        put(bytes, rows + 3, fluid + walls + 1);
+    }
+    put(bytes, words - 3, UINT64_C(1) << 31);
+    put(bytes, words - 2, bodies);
     seal(bytes, words);
     *made = 8 * words;
     return bytes;
