@@ -226,7 +226,7 @@ static double network_flops(const subject *s, const ascc_network_run *run)
         const ascc_layer *layer = &plan->layer[l];
         for (int32_t t = layer->first_term; t < layer->first_term + layer->term_count; t++)
             flops += term_flops(run, &plan->term[t], run->network->term_key[t][0],
-                                run->value[l + 2].active, run->hierarchy->set[layer->set].count);
+                                run->value[l + 2].active, ascc_network_rows(run, layer->set));
     }
     const double bumps = plan->output.term.filter.bumps;
     if (bumps > 0.0)

@@ -667,6 +667,50 @@ static void cells_and_outputs_that_agree_with_the_tensors_load(void **state)
     free(cells);
 }
 
+static void wrong_graph_networks_are_refused_by_name(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *from, *to, *hint;
+    } cases[] = {
+        {"\"edges\":{\"points\":\"all\"", "\"edges\":{\"points\":\"level1\"", "'edges'"},
+        {"\"edges\":{\"points\":\"all\"", "\"edges\":{\"points\":\"fluid\"", "'gather'"},
+        {"\"edges\":{\"points\":\"all\"", "\"edges\":{\"limit\":3,\"points\":\"all\"", "'limit'"},
+        {"\"edges\":{", "\"edges\":{\"radius\":0,", "'radius'"},
+        {",\"layers\"", ",\"edges\":7,\"layers\"", "twice"},
+        {"\"end\":\"sender\"", "\"end\":\"both\"", "'both'"},
+        {",\"end\":\"sender\"", "", "'end'"},
+        {"\"name\":\"a1\",\"points\":\"all\"", "\"name\":\"a1\",\"points\":\"edges\"", "'sum'"},
+        {"\"name\":\"a1\",\"points\":\"all\"", "\"name\":\"a1\",\"points\":\"fluid\"", "'sum'"},
+        {"\"name\":\"h1\",\"points\":\"edges\"", "\"name\":\"h1\",\"points\":\"all\"", "'gather'"},
+        {"\"type\":\"displacement\",\"source\":\"fluid\"",
+         "\"type\":\"displacement\",\"source\":\"boundary\"", "'displacement'"},
+        {"\"name\":\"way\",\"points\":\"edges\"", "\"name\":\"way\",\"points\":\"all\"",
+         "'displacement'"},
+        {"\"name\":\"way\",\"points\":\"edges\",\"channels\":3",
+         "\"name\":\"way\",\"points\":\"edges\",\"channels\":2", "columns"},
+        {"\"offset\":\"m1.offset\"", "\"offset\":\"h1.kernel\"", "'h1.kernel' has the shape"},
+        {",\"offset\":\"m1.offset\"", "", "'offset'"},
+        {"\"source\":\"l0.0\",\"relu\":false", "\"source\":\"m1\",\"relu\":false", "output"},
+        {"{\"type\":\"dense\",\"source\":\"i\"", "{\"type\":\"dense\",\"source\":\"way\"",
+         "not made before"},
+        {"{\"type\":\"identity\",\"source\":\"e0\"}", "{\"type\":\"identity\",\"source\":\"n0\"}",
+         "shares no points"},
+        {"{\"type\":\"displacement\",\"source\":\"fluid\"}",
+         "{\"type\":\"moments\",\"source\":\"fluid\",\"radius\":1,\"basis\":{\"bumps\":1}}",
+         "neither reads edges nor lies on them"},
+    };
+    char *description = model_builder_description('g');
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        char *changed = replaced(description, cases[i].from, cases[i].to);
+        size_t size;
+        unsigned char *bytes = model_builder_described('g', changed, &size);
+        must_refuse(cases[i].to, bytes, size, cases[i].hint);
+        free(changed);
+    }
+    free(description);
+}
+
 static void wrong_descriptions_are_refused_by_name(void **state)
 {
     (void)state;
@@ -1298,6 +1342,7 @@ int main(void)
         cmocka_unit_test(base_network_loads),
         cmocka_unit_test(cells_and_outputs_that_agree_with_the_tensors_load),
         cmocka_unit_test(wrong_descriptions_are_refused_by_name),
+        cmocka_unit_test(wrong_graph_networks_are_refused_by_name),
         cmocka_unit_test(wrong_bases_and_transfers_are_refused_by_name),
         cmocka_unit_test(wrong_motions_dampings_and_walls_are_refused_by_name),
         cmocka_unit_test(wrong_abstractions_and_interpolations_are_refused_by_name),

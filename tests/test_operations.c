@@ -185,6 +185,15 @@ static void pairs_basis(int v, model_random *r)
     r->trunk_layers = 1;
 }
 
+static void graph(int v, model_random *r)
+{
+    r->plain = 1;
+    r->graph = 1 + v / 2 % 2;
+    r->fluid_only = v / 4 % 2;
+    r->radius = 1.45;
+    r->evaluate = evaluations[v / 3 % 3];
+}
+
 static void plain(int v, model_random *r)
 {
     r->plain = 1;
@@ -224,6 +233,10 @@ static const recipe recipes[] = {
     {"transfer", 16, 700, transfer, NULL},
     {"pairs on a grid", 20, 800, pairs_grid, NULL},
     {"pairs in a basis", 32, 900, pairs_basis, NULL},
+    {"displacement of edges", 8, 1300, graph, NULL},
+    {"gather to edges", 0, 0, NULL, NULL}, /* the same networks */
+    {"sum over edges", 0, 0, NULL, NULL},
+    {"layer normalisation", 0, 0, NULL, NULL},
     {"plain output", 8, 1000, plain, NULL},
     {"no output", 0, 0, NULL, NULL}, /* tests/test_relaxation.c */
     {"scale", 4, 1100, scale, add_scaled},

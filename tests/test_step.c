@@ -21,10 +21,10 @@ typedef struct world_options {
     int32_t dimension, threads, neighbor_limit;
     uint32_t cpu_disable;
     bool radial, walls, unequal, random_network;
-    bool gravity;                            /* the random network sees it */
-    const char *method;                      /* of sampling; NULL = voxel centres */
-    int bumps, order, transfer, abstraction; /* of the random network: see model_random */
-    const char *type;                        /* of its weights, all of which every type holds */
+    bool gravity;                                   /* the random network sees it */
+    const char *method;                             /* of sampling; NULL = voxel centres */
+    int bumps, order, transfer, abstraction, graph; /* of the random network: see model_random */
+    const char *type; /* of its weights, all of which every type holds */
     uint32_t shuffle;
     double far;  /* one more particle this far away; 0 = none */
     double unit; /* metres in the host's length; 0 = 1 */
@@ -42,9 +42,11 @@ static ascc_model *make_model(ascc_context *context, const world_options *o)
     if (o->random_network) {
         const model_random r = {.seed = 5,
                                 .dimension = o->dimension,
-                                .levels = 2,
+                                .levels = o->graph ? 1 : 2,
                                 .channels = 8,
                                 .spacing = spacing,
+                                .graph = o->graph,
+                                .plain = o->graph,
                                 .projection = o->radial ? "radial" : "none",
                                 .scale = o->bumps ? 0.001 : 0.0,
                                 .bumps = o->bumps,
@@ -413,6 +415,24 @@ static void bits_do_not_depend_on_threads_cpu_or_order(void **state)
         o.cpu_disable = 0;
         for (o.shuffle = 1; o.shuffle < 4; o.shuffle++)
             assert_true(hash_after(&o, steps) == want);
+    }
+}
+
+static void a_graph_network_gives_the_same_bits_for_threads_cpu_and_order(void **state)
+{
+    (void)state;
+    for (int variant = 0; variant < 4; variant++) {
+        world_options o = {.dimension = 3 - (variant & 1),
+                           .threads = 1,
+                           .random_network = true,
+                           .walls = variant & 2,
+                           .graph = 1 + variant % 2};
+        const uint64_t want = hash_after(&o, 5);
+        for (o.threads = 2; o.threads <= 7; o.threads = o.threads * 2 + 1)
+            assert_true(hash_after(&o, 5) == want);
+        o.cpu_disable = ASCC_CPU_AVX2 | ASCC_CPU_AVX512 | ASCC_CPU_NEON | ASCC_CPU_SIMD128;
+        o.shuffle = 3;
+        assert_true(hash_after(&o, 5) == want);
     }
 }
 
@@ -810,11 +830,12 @@ static world_options counted(test_memory *memory, world_options o)
 static void a_steady_step_allocates_nothing(void **state)
 {
     (void)state;
-    for (int random = 0; random < 3; random++) {
+    for (int random = 0; random < 4; random++) {
         test_memory c = {0};
         const world_options o = counted(&c, (world_options){.dimension = 3,
                                                             .walls = true,
                                                             .random_network = random,
+                                                            .graph = random == 3 ? 2 : 0,
                                                             .bumps = random == 2 ? 3 : 0,
                                                             .transfer = random == 2});
         world w = open_world(&o);
@@ -845,12 +866,13 @@ static void a_steady_step_allocates_nothing(void **state)
     }
 }
 
-static void check_each_failing_allocation(int bumps)
+static void check_each_failing_allocation(int bumps, int graph)
 {
     test_memory c = {0};
     const world_options o = counted(&c, (world_options){.dimension = 3,
                                                         .walls = true,
                                                         .random_network = true,
+                                                        .graph = graph,
                                                         .bumps = bumps,
                                                         .transfer = bumps > 0});
     world w = open_world(&o);
@@ -883,8 +905,9 @@ static void check_each_failing_allocation(int bumps)
 static void each_failing_allocation_leaves_the_particles_as_they_were(void **state)
 {
     (void)state;
-    check_each_failing_allocation(0);
-    check_each_failing_allocation(3);
+    check_each_failing_allocation(0, 0);
+    check_each_failing_allocation(0, 2);
+    check_each_failing_allocation(3, 0);
 }
 
 /* A jittered block of side^dimension particles. */
@@ -930,10 +953,11 @@ static void the_first_bad_row_is_named_for_any_number_of_threads(void **state)
 static void the_estimate_of_scratch_is_within_a_factor_of_two(void **state)
 {
     (void)state;
-    for (int variant = 0; variant < 4; variant++) {
+    for (int variant = 0; variant < 6; variant++) {
         test_memory c = {0};
-        const world_options o = counted(
-            &c, (world_options){.dimension = 2 + variant % 2, .random_network = variant > 1});
+        const world_options o = counted(&c, (world_options){.dimension = 2 + variant % 2,
+                                                            .random_network = variant > 1,
+                                                            .graph = variant > 3 ? 3 : 0});
         world w = open_world(&o);
         set_block(&w, o.dimension == 2 ? 60 : 16);
         const size_t count = ascc_particles_count(w.particles, ASCC_FLUID);
@@ -1430,6 +1454,7 @@ int main(void)
         cmocka_unit_test(a_basis_conserves_angular_momentum),
         cmocka_unit_test(pair_impulses_are_along_the_line_with_radial_projection_or_a_basis),
         cmocka_unit_test(bits_do_not_depend_on_threads_cpu_or_order),
+        cmocka_unit_test(a_graph_network_gives_the_same_bits_for_threads_cpu_and_order),
         cmocka_unit_test(every_way_of_sampling_steps_with_the_same_bits),
         cmocka_unit_test(short_weights_give_the_bits_of_the_floats_they_stand_for),
         cmocka_unit_test(bits_do_not_depend_on_the_hosts_job_system),

@@ -10,6 +10,7 @@ struct ascc_cost_counts {
     double wall;  /* within 4 spacings of a particle */
     double boundary;               /* wall particles per fluid particle */
     double level[ASCC_MAX_LEVELS]; /* points per fluid particle, [0] not used */
+    double edges;                  /* per fluid particle; ascc_cost finds it */
 };
 typedef struct ascc_cost_counts ascc_cost_counts;
 

@@ -16,6 +16,7 @@ static const char *const features[] = {"one", "velocity", "normal", "motion", "g
 static const char *const samplings[] = {"voxel_centers", "voxel_corners", "farthest"};
 static const char *const sampled[] = {"all", "fluid"};
 static const char *const anchors[] = {"world", "centroid"};
+static const char *const connected[] = {"fluid", "all"};
 
 static void read_text(ascc_plan_builder *builder, ascc_reader *reader, uint32_t object,
                       const char *key, char *into, size_t capacity)
@@ -90,6 +91,21 @@ static void read_levels(ascc_reader *reader, uint32_t root, ascc_plan *plan)
     ascc_reader_where(reader, "network");
 }
 
+/* Which pairs of points are edges. */
+static void read_edges(ascc_reader *reader, ascc_plan *plan)
+{
+    static const int32_t sets[] = {ASCC_SET_FLUID, ASCC_SET_ALL};
+    if (!ascc_reader_has(reader, 0, "edges"))
+        return;
+    const uint32_t object = ascc_reader_object(reader, 0, "edges");
+    ascc_reader_where(reader, "network 'edges'");
+    plan->edge_set =
+        sets[ascc_reader_choice(reader, object, "points", connected, COUNT(connected))];
+    plan->edge_radius = ascc_reader_number(reader, object, "radius", ASCC_PLAN_MIN, ASCC_PLAN_MAX);
+    ascc_reader_end(reader, object);
+    ascc_reader_where(reader, "network");
+}
+
 /* The range of time steps that the weights were trained in; without it only the one stated, but shorter
  * ones scale like an acceleration. */
 static void read_range(ascc_reader *reader, ascc_plan *plan)
@@ -131,16 +147,17 @@ static void read_head(ascc_plan_builder *builder, ascc_reader *reader)
     ascc_reader_end(reader, object);
     ascc_reader_where(reader, "network");
     read_levels(reader, 0, plan);
+    read_edges(reader, plan);
     if (reader->status == ASCC_OK)
         reader->status = ascc_plan_begin(builder);
 }
 
-/* "fluid", "boundary", "all", "level1" to "level7". Whether the level exists is checked later. */
+/* "fluid", "boundary", "all", "level1" to "level7", "edges". Whether they exist is checked later. */
 static int32_t read_set(ascc_reader *reader, uint32_t object)
 {
-    static const char *const sets[] = {"fluid",  "boundary", "all",    "level1", "level2",
-                                       "level3", "level4",   "level5", "level6", "level7"};
-    _Static_assert(sizeof sets / sizeof *sets == ASCC_MAX_SETS, "a name for each set");
+    static const char *const sets[] = {"fluid",  "boundary", "all",    "level1", "level2", "level3",
+                                       "level4", "level5",   "level6", "level7", "edges"};
+    _Static_assert(sizeof sets / sizeof *sets == ASCC_SET_EDGES + 1, "a name for each set");
     return ascc_reader_choice(reader, object, "points", sets, COUNT(sets));
 }
 

@@ -58,7 +58,7 @@ static double cube_root(double number)
 
 double ascc_initial_spacing(const ascc_plan *plan, int32_t set)
 {
-    if (set < ASCC_SET_LEVEL)
+    if (set < ASCC_SET_LEVEL || set == ASCC_SET_EDGES)
         return plan->spacing;
     const ascc_level *level = &plan->level[set - ASCC_SET_LEVEL + 1];
     if (!(level->ratio > 0.0))

@@ -22,6 +22,10 @@ typedef struct ascc_list_key {
 } ascc_list_key;
 #define ASCC_MAX_LISTS 2 /* of one term */
 
+/* Points of an edge: the neighbour, and the one whose neighbour that is. */
+#define ASCC_END_SENDER 1
+#define ASCC_END_RECEIVER 2
+
 /* Counted in multiply-adds by `cost`: points around a particle (model/cost.h). */
 typedef struct ascc_cost_counts ascc_cost_counts;
 
@@ -83,6 +87,9 @@ typedef struct ascc_operation {
                    const ascc_term *term);
     /* Raises what it needs; of an output: `column` is bytes of each row of its set. NULL = nothing. */
     void (*scratch)(const ascc_plan *plan, const ascc_term *term, ascc_scratch_sizes *sizes);
+    /* Of a term that lies on edges or reads them from points: whose values it reads of an edge's two
+     * (ASCC_END_*). NULL = it does not go from points to edges or back. */
+    int (*ends)(const ascc_term *term);
     /* It reads the fluid's features besides its source. NULL = never. */
     bool (*reads_features)(const ascc_term *term);
     /* It can read its rows from a tile, ascc_tile.given, before their value is stored. */

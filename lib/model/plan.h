@@ -31,6 +31,8 @@
 /* Point sets. Level 0 is fluid + boundary; set ASCC_SET_LEVEL + l - 1 is level l >= 1. */
 enum { ASCC_SET_FLUID = 0, ASCC_SET_BOUNDARY = 1, ASCC_SET_ALL = 2, ASCC_SET_LEVEL = 3 };
 #define ASCC_MAX_SETS (ASCC_SET_LEVEL + ASCC_MAX_LEVELS - 1)
+/* No points, but pairs of them: its rows are the entries of one neighbour list (network/edges.h). */
+#define ASCC_SET_EDGES ASCC_MAX_SETS
 
 typedef enum ascc_window {
     ASCC_WINDOW_NONE,
@@ -194,6 +196,8 @@ typedef struct ascc_plan {
     int32_t fluid_sampled; /* levels have points where fluid is, not where walls are */
     double hysteresis;     /* of ASCC_SAMPLING_CORNERS, in voxels */
     ascc_level level[ASCC_MAX_LEVELS];
+    int32_t edge_set;   /* whose points edges connect */
+    double edge_radius; /* m: of edges; 0 = the network has none */
     int32_t layer_count, term_count;
     ascc_layer *layer;
     ascc_term *term;

@@ -351,7 +351,10 @@ ascc_status ascc_plan_add_layer(ascc_plan_builder *builder, const char *name, in
         status = ascc_plan_text(builder, "layer name", name, layer.name, sizeof layer.name);
     if (status != ASCC_OK)
         return status;
-    if (set < 0 || set >= ASCC_SET_LEVEL + plan->level_count - 1)
+    if (set == ASCC_SET_EDGES && !(plan->edge_radius > 0.0))
+        return FAIL("layer '%s' lies on 'edges', but the network does not say which: 'edges'",
+                    ascc_quote(name).text);
+    if (set < 0 || (set >= ASCC_SET_LEVEL + plan->level_count - 1 && set != ASCC_SET_EDGES))
         return FAIL("layer '%s': no such level", ascc_quote(name).text);
     if (channels < 1 || channels > ASCC_MAX_CHANNELS)
         return FAIL("layer '%s': channels must be within 1 and %d", ascc_quote(name).text,
@@ -384,6 +387,11 @@ static ascc_status check_term(ascc_plan_builder *builder, ascc_term_entry *entry
     term->gathered = term->inputs;
     if (term->inputs == 0)
         return FAIL("layer '%s': a source without channels", ascc_quote(layer->name).text);
+    if ((layer->set == ASCC_SET_EDGES ||
+         ascc_plan_value_set(builder->layer, term->source) == ASCC_SET_EDGES) &&
+        term->operation->lists && !term->operation->ends)
+        return FAIL("layer '%s': '%s' neither reads edges nor lies on them",
+                    ascc_quote(layer->name).text, term->operation->type);
     const int32_t given = term->outputs;
     if (!term->operation->tensors || !name[0])
         term->outputs = term->inputs;

@@ -52,7 +52,7 @@ double ascc_plan_support_radius(const ascc_plan *plan)
 /* How far from a point of the set the particles lie that put it there. */
 static double sampling_reach(const ascc_plan *plan, int32_t set)
 {
-    if (set < ASCC_SET_LEVEL)
+    if (set < ASCC_SET_LEVEL || set == ASCC_SET_EDGES)
         return 0.0;
     const double diagonal =
         plan->level[set - ASCC_SET_LEVEL + 1].voxel * sqrt((double)plan->dimension);

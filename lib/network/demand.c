@@ -76,7 +76,7 @@ static int32_t relaxation_key(ascc_network *network, int32_t source)
 
 static size_t key_capacity(const ascc_plan *plan)
 {
-    return ((size_t)plan->term_count + 1) * ASCC_MAX_LISTS + 2;
+    return ((size_t)plan->term_count + 1) * ASCC_MAX_LISTS + 3;
 }
 
 ascc_status ascc_network_create(ascc_network *network, const ascc_allocator *allocator,
@@ -88,21 +88,34 @@ ascc_status ascc_network_create(ascc_network *network, const ascc_allocator *all
                               .plan = plan,
                               .packed = packed,
                               .value_count = plan->layer_count + 2,
+                              .edge_key = -1,
                               .max_neighbors = max_neighbors};
     network->key = ascc_allocate(allocator, key_capacity(plan), sizeof *network->key);
     network->term_key = ascc_allocate(allocator, terms, sizeof *network->term_key);
     network->wants = ascc_allocate(allocator, (size_t)network->value_count, 1);
-    if (!network->key || !network->term_key || !network->wants) {
+    network->last_reader =
+        ascc_allocate(allocator, (size_t)network->value_count, sizeof *network->last_reader);
+    if (!network->key || !network->term_key || !network->wants || !network->last_reader) {
         ascc_network_destroy(network);
         return ascc_fail(message, ASCC_ERROR_MEMORY, "no memory to prepare the network");
     }
     memset(network->wants, 0, (size_t)network->value_count);
+    for (int32_t v = 0; v < network->value_count; v++)
+        network->last_reader[v] = -1;
     for (int32_t l = 0; l < plan->layer_count; l++)
-        for (int32_t t = 0; t < plan->layer[l].term_count; t++)
-            prepare_term(network, plan->layer[l].first_term + t, plan->layer[l].set);
+        for (int32_t t = plan->layer[l].first_term;
+             t < plan->layer[l].first_term + plan->layer[l].term_count; t++) {
+            prepare_term(network, t, plan->layer[l].set);
+            network->last_reader[plan->term[t].source] = l;
+        }
+    network->last_reader[plan->output.term.source] = plan->layer_count;
     prepare_term(network, plan->term_count, ascc_network_set(network, plan->output.term.source));
     if (plan->relaxation.guess)
         network->wants[plan->relaxation.guess] |= ASCC_WANTS_RECTIFIED;
+    if (plan->edge_radius > 0.0) {
+        const ascc_list_key edges = ascc_edges_list(plan);
+        network->edge_key = find_key(network, &edges);
+    }
     for (int i = 0; i < 2; i++)
         network->relaxation_key[i] =
             plan->relaxation.pressure.count
@@ -123,6 +136,9 @@ void ascc_network_destroy(ascc_network *network)
         ascc_release(a, network->term_key, terms, sizeof *network->term_key);
     if (network->wants)
         ascc_release(a, network->wants, (size_t)network->value_count, 1);
+    if (network->last_reader)
+        ascc_release(a, network->last_reader, (size_t)network->value_count,
+                     sizeof *network->last_reader);
     memset(network, 0, sizeof *network);
 }
 
@@ -161,7 +177,10 @@ static bool take_active(ascc_network_run *run)
 {
     const ascc_network *network = run->network;
     for (int32_t v = 0; v < network->value_count; v++) {
-        const size_t count = run->hierarchy->set[ascc_network_set(network, v)].count;
+        const int32_t set = ascc_network_set(network, v);
+        /* edges: those of a point are needed together, and told apart once they are counted */
+        const size_t count =
+            run->hierarchy->set[set == ASCC_SET_EDGES ? network->plan->edge_set : set].count;
         run->value[v].active = ascc_arena_take(run->tools->arena, count, 1);
         if (!run->value[v].active)
             return false;
@@ -271,12 +290,28 @@ static ascc_status demand_output(ascc_network_run *run)
     return status;
 }
 
+/* A term that lies on edges or reads them; active, and flags of edges: of the points that edges lead to. */
+static ascc_status demand_edges(ascc_network_run *run, const ascc_term *term, const uint8_t *active)
+{
+    const int32_t key = run->network->edge_key;
+    const bool on_edges = ascc_network_set(run->network, term->source) == ASCC_SET_EDGES;
+    const int ends = term->operation->ends ? term->operation->ends(term) : 0;
+    uint8_t *reads = run->value[term->source].active;
+    if (ends & ASCC_END_SENDER)
+        return demand_rows(run, key, active, reads);
+    for (size_t i = 0; (on_edges || ends) && i < run->rows[key].query->count; i++)
+        reads[i] |= active[i];
+    return ascc_rows_make(&run->rows[key], run->tools, active);
+}
+
 static ascc_status demand_term(ascc_network_run *run, const ascc_layer *layer, int32_t t,
                                const uint8_t *active)
 {
     const int32_t source = run->plan->term[t].source, *key = run->network->term_key[t];
     uint8_t *reads = run->value[source].active;
     ascc_status status = ASCC_OK;
+    if (layer->set == ASCC_SET_EDGES || ascc_network_set(run->network, source) == ASCC_SET_EDGES)
+        return demand_edges(run, &run->plan->term[t], active);
     for (int i = 0; i < ASCC_MAX_LISTS && status == ASCC_OK && key[i] >= 0; i++)
         status = demand_rows(run, key[i], active, i ? run->value[1].active : reads);
     if (key[0] >= 0)
@@ -294,6 +329,17 @@ static ascc_status demand_layer(ascc_network_run *run, int32_t l)
     ascc_status status = ASCC_OK;
     for (int32_t t = 0; t < layer->term_count && status == ASCC_OK; t++)
         status = demand_term(run, layer, layer->first_term + t, run->value[l + 2].active);
+    return status;
+}
+
+/* Edges become rows, and flags of the points that they lead to flags of edges. */
+static ascc_status number_edges(ascc_network_run *run)
+{
+    const ascc_network *network = run->network;
+    ascc_status status = ascc_edges_number(&run->edges, &run->rows[network->edge_key], run->tools);
+    for (int32_t v = 2; v < network->value_count && status == ASCC_OK; v++)
+        if (ascc_network_set(network, v) == ASCC_SET_EDGES)
+            status = ascc_edges_flags(&run->edges, run->tools, &run->value[v].active);
     return status;
 }
 
@@ -323,6 +369,8 @@ ascc_status ascc_network_demand(ascc_network_run *run, const ascc_network *netwo
         status = demand_layer(run, l);
     for (int i = 0; status == ASCC_OK && i < 2 && network->relaxation_key[i] >= 0; i++)
         status = ascc_rows_make(&run->rows[network->relaxation_key[i]], tools, NULL);
+    if (status == ASCC_OK && network->edge_key >= 0)
+        status = number_edges(run);
     for (int32_t k = 0; status == ASCC_OK && k < network->key_count; k++) {
         const ascc_rows *rows = &run->rows[k];
         if (expected)

@@ -128,11 +128,13 @@ static void pass_on(const layer_job *job, const ascc_tile *from, float *sum)
 static int32_t begin_tile(const layer_job *job, const ascc_tile *tile)
 {
     const ascc_layer *layer = job->layer;
+    const int32_t l = (int32_t)(layer - job->run->plan->layer);
     memset(tile->sum, 0, tile->n * tile->width * sizeof *tile->sum);
-    if (!is_begun(job->run->network, (int32_t)(layer - job->run->plan->layer)))
+    if (!is_begun(job->run->network, l))
         return 0;
+    const ascc_value *value = &job->run->value[l + 2]; /* there, even if it is passed on in turn */
     for (size_t r = 0; r < tile->n; r++)
-        memcpy(tile->sum + r * tile->width, begun_row(job->value, tile->list[r], layer->channels),
+        memcpy(tile->sum + r * tile->width, begun_row(value, tile->list[r], layer->channels),
                (size_t)layer->channels * sizeof *tile->sum);
     return 1;
 }
@@ -163,23 +165,45 @@ static void compute_tiles(void *data, size_t begin, size_t end, int32_t slot)
     }
 }
 
-/* Room for a value as its readers want it; kernels may load eight numbers from any in a row. */
-static bool take_value(ascc_network_run *run, int32_t v)
+/* Edges are many, and their values mostly read once: one takes over the memory of another that has been read for
+ * the last time before this layer, if there is one. */
+static float *take_over(ascc_network_run *run, int32_t v, int32_t layer)
 {
-    const size_t rows = run->hierarchy->set[ascc_network_set(run->network, v)].count + 1;
+    const ascc_network *network = run->network;
+    const size_t channels = ascc_padded(ascc_network_channels(network, v));
+    if (ascc_network_set(network, v) != ASCC_SET_EDGES || network->keeps_values)
+        return NULL;
+    for (int32_t u = 2; u < v; u++) {
+        ascc_value *old = &run->value[u];
+        float **memory = old->raw ? &old->raw : &old->rectified, *taken = *memory;
+        if (ascc_network_set(network, u) != ASCC_SET_EDGES || network->last_reader[u] >= layer ||
+            ascc_padded(ascc_network_channels(network, u)) != channels || !taken)
+            continue;
+        *memory = NULL;
+        return taken;
+    }
+    return NULL;
+}
+
+static bool take_copy(ascc_network_run *run, int32_t v, int32_t layer, size_t rows, size_t channels,
+                      float **copy)
+{
+    *copy = take_over(run, v, layer);
+    if (!*copy)
+        *copy = ascc_arena_take(run->tools->arena, rows, channels * sizeof(float));
+    return *copy != NULL;
+}
+
+/* Room for a value as its readers want it, while this layer is computed; kernels may load eight numbers from any in a row. */
+static bool take_value(ascc_network_run *run, int32_t v, int32_t layer)
+{
+    const size_t rows = ascc_network_rows(run, ascc_network_set(run->network, v)) + 1;
     const size_t channels = ascc_padded(ascc_network_channels(run->network, v));
     ascc_value *value = &run->value[v];
-    if (run->network->wants[v] & ASCC_WANTS_RAW) {
-        value->raw = ascc_arena_take(run->tools->arena, rows, channels * sizeof(float));
-        if (!value->raw)
-            return false;
-    }
-    if (run->network->wants[v] & ASCC_WANTS_RECTIFIED) {
-        value->rectified = ascc_arena_take(run->tools->arena, rows, channels * sizeof(float));
-        if (!value->rectified)
-            return false;
-    }
-    return true;
+    const uint8_t wants = run->network->wants[v];
+    return (!(wants & ASCC_WANTS_RAW) || take_copy(run, v, layer, rows, channels, &value->raw)) &&
+           (!(wants & ASCC_WANTS_RECTIFIED) ||
+            take_copy(run, v, layer, rows, channels, &value->rectified));
 }
 
 typedef struct features_job {
@@ -246,11 +270,11 @@ static bool take_values(ascc_network_run *run, int32_t l, bool passed_on, size_t
     const ascc_plan *plan = run->plan;
     *width = 0;
     if (!passed_on)
-        return is_begun(run->network, l) || take_value(run, l + 2);
+        return is_begun(run->network, l) || take_value(run, l + 2, l);
     for (int32_t m = l + 1; m < plan->layer_count; m++)
         if (reads_tiles(plan, m, l)) {
             *width = ascc_max_size(*width, ascc_padded(plan->layer[m].channels) + 8);
-            if (!take_value(run, m + 2))
+            if (!take_value(run, m + 2, l))
                 return false;
         }
     return true;
@@ -298,7 +322,7 @@ static ascc_status compute_layer(ascc_network_run *run, int32_t l, uint32_t *lis
     if (!job.scratch || !job.sequence)
         return ascc_fail(tools->message, ASCC_ERROR_MEMORY, "no memory for layer %s", layer->name);
     const size_t count =
-        list_active(tools, run->value[l + 2].active, run->hierarchy->set[layer->set].count, list);
+        list_active(tools, run->value[l + 2].active, ascc_network_rows(run, layer->set), list);
     ascc_workers_run(tools->workers, count, ASCC_TILE_ROWS * 4, compute_tiles, &job);
     ascc_arena_return(tools->arena, mark);
     return ASCC_OK;
@@ -308,11 +332,11 @@ ascc_status ascc_network_forward(ascc_network_run *run, const float *fluid_featu
                                  const float *boundary_features)
 {
     const ascc_network *network = run->network;
-    size_t most = 0;
+    size_t most = run->edges.count;
     for (int s = 0; s < ASCC_MAX_SETS; s++)
         most = ascc_max_size(most, run->hierarchy->set[s].count);
     uint32_t *list = ascc_arena_lend(run->tools->arena, most, sizeof *list);
-    if (!list || !take_value(run, 0) || !take_value(run, 1))
+    if (!list || !take_value(run, 0, 0) || !take_value(run, 1, 0))
         return ascc_fail(run->tools->message, ASCC_ERROR_MEMORY, "no memory for the features");
     for (int32_t v = 0; v < 2; v++) {
         features_job job = {run, v, v == 0 ? fluid_features : boundary_features};

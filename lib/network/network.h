@@ -7,6 +7,7 @@
 #ifndef ASCC_NETWORK_H
 #define ASCC_NETWORK_H
 
+#include "edges.h"
 #include "hierarchy.h"
 #include "model/operation.h"
 #include "model/packed.h"
@@ -24,8 +25,10 @@ typedef struct ascc_network {
     int32_t key_count;
     ascc_list_key *key;                  /* [key_count] of all neighbour lists */
     int32_t (*term_key)[ASCC_MAX_LISTS]; /* [term_count + 1], last: the output; -1 = none */
+    int32_t edge_key;                    /* whose entries are the edges; -1 = there are none */
     int32_t relaxation_key[2]; /* fluid and walls around the fluid; -1 = there is no relaxation */
     uint8_t *wants;            /* [value_count] ASCC_WANTS_* */
+    int32_t *last_reader;      /* [value_count] layers; layer_count: the output */
     int32_t max_neighbors;     /* of a point, before LIMIT */
     bool
         keeps_values; /* also those that readers are given tile by tile: for a way back, as all of a step then */
@@ -59,13 +62,20 @@ typedef struct ascc_network_run {
     ascc_hierarchy *hierarchy;
     const ascc_search_tools *tools;
     ascc_value *value;
-    ascc_rows *rows;  /* [key_count] */
+    ascc_rows *rows; /* [key_count] */
+    ascc_edges edges;
     uint32_t **table; /* [key_count] what operations make of a list, else NULL */
     float
         gravity[8]; /* of the step, in units of the model's own (if that is 0: m/s^2), then zeros */
     size_t neighbor_count;
     uint32_t longest;
 } ascc_network_run;
+
+/* Rows of a value on this set. */
+static inline size_t ascc_network_rows(const ascc_network_run *run, int32_t set)
+{
+    return set == ASCC_SET_EDGES ? run->edges.count : run->hierarchy->set[set].count;
+}
 
 /* Finds the rows every value needs and searches them. expected: [key_count] neighbours of each list in
  * the last step, kept by the caller; or NULL. errors: MEMORY, RANGE, LIMIT. */

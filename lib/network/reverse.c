@@ -65,7 +65,7 @@ static bool take_gradients(ascc_reverse *p)
 {
     const ascc_network_run *run = p->run;
     for (int32_t v = 0; v < run->network->value_count; v++) {
-        const size_t rows = run->hierarchy->set[ascc_network_set(run->network, v)].count;
+        const size_t rows = ascc_network_rows(run, ascc_network_set(run->network, v));
         const size_t size = rows * ascc_padded(ascc_network_channels(run->network, v));
         if (wants_value(p, v) &&
             (!take_gradient(p, run->value[v].raw, size, &p->value[v].raw) ||
@@ -145,7 +145,7 @@ static ascc_status pass_layer(ascc_reverse *p, int32_t l)
 {
     const ascc_plan *plan = p->run->plan;
     const ascc_layer *layer = &plan->layer[l];
-    const size_t rows = p->run->hierarchy->set[layer->set].count;
+    const size_t rows = ascc_network_rows(p->run, layer->set);
     const uint8_t *active = p->run->value[l + 2].active;
     const size_t channels = (size_t)layer->channels, width = ascc_padded(layer->channels);
     p->set = layer->set;

@@ -12,6 +12,8 @@
 
 /* Bytes of one point: three 64-bit positions and their low words. */
 #define POINT_BYTES 36.0
+/* An edge: its two points. */
+#define EDGE_BYTES 8.0
 /* A point that is sorted: key and row, twice. */
 #define SORT_BYTES 24.0
 
@@ -19,6 +21,8 @@ static double power(double x, int32_t n)
 {
     return n == 2 ? x * x : x * x * x;
 }
+
+static double edge_count(const ascc_plan *plan, double fluid, double boundary);
 
 /* Points of a set. */
 static double set_points(const ascc_plan *plan, int32_t set, double fluid, double boundary)
@@ -30,6 +34,8 @@ static double set_points(const ascc_plan *plan, int32_t set, double fluid, doubl
     const double all = fluid + boundary;
     if (set == ASCC_SET_ALL)
         return all;
+    if (set == ASCC_SET_EDGES)
+        return edge_count(plan, fluid, boundary);
     const ascc_level *level = &plan->level[set - ASCC_SET_LEVEL + 1];
     if (plan->sampling == ASCC_SAMPLING_FARTHEST)
         return all * level->ratio;
@@ -56,6 +62,12 @@ static double row_length(const ascc_plan *plan, const ascc_list_key *key)
     const double cube = power(2.0 * key->cube, plan->dimension);
     const double all = 1.0 + (key->cube > 0.0 ? cube : ball) * set_density(plan, key->source);
     return key->limit ? fmin(all, key->limit + 1.0) : all;
+}
+
+static double edge_count(const ascc_plan *plan, double fluid, double boundary)
+{
+    const ascc_list_key key = {.source = plan->edge_set, .radius = plan->edge_radius};
+    return set_points(plan, plan->edge_set, fluid, boundary) * row_length(plan, &key);
 }
 
 static double rows_bytes(const ascc_plan *plan, const ascc_list_key *key, double queries)
@@ -98,11 +110,28 @@ static double search_bytes(const ascc_network *network, double fluid, double bou
     return bytes;
 }
 
+/* Values on edges that are there at once: those of one channel count that are still to be read. */
+static double edge_value_bytes(const ascc_network *network, double edges)
+{
+    double most = 0.0;
+    for (int32_t l = 0; l < network->plan->layer_count; l++) {
+        double floats = 0.0;
+        for (int32_t v = 2; v <= l + 2; v++)
+            if (ascc_network_set(network, v) == ASCC_SET_EDGES && network->last_reader[v] >= l &&
+                !ascc_network_passes_on(network, v - 2))
+                floats += ((network->wants[v] & 1) + (network->wants[v] >> 1 & 1)) *
+                          (double)ascc_padded(ascc_network_channels(network, v));
+        most = fmax(most, floats);
+    }
+    return 4.0 * edges * most;
+}
+
 static double value_bytes(const ascc_network *network, double fluid, double boundary)
 {
     double bytes = 0.0;
     for (int32_t v = 0; v < network->value_count; v++) {
-        const bool stored = v < 2 || !ascc_network_passes_on(network, v - 2);
+        const bool stored = ascc_network_set(network, v) != ASCC_SET_EDGES &&
+                            (v < 2 || !ascc_network_passes_on(network, v - 2));
         const double copies =
             stored ? 4.0 * ((network->wants[v] & 1) + (network->wants[v] >> 1 & 1)) : 0.0;
         bytes += set_points(network->plan, ascc_network_set(network, v), fluid, boundary) *
@@ -172,6 +201,9 @@ size_t ascc_estimate_scratch(const ascc_network *network, size_t fluid, size_t b
     double longest = 0.0;
     for (int32_t k = 0; k < network->key_count; k++)
         longest = fmax(longest, row_length(plan, &network->key[k]));
+    if (plan->edge_radius > 0.0)
+        points += (EDGE_BYTES)*edge_count(plan, f, b) + 8.0 * all +
+                  edge_value_bytes(network, edge_count(plan, f, b));
     const double features = 4.0 * (f * plan->fluid_channels + b * plan->boundary_channels);
     const double search = search_bytes(network, f, b);
     const double forward =

@@ -199,7 +199,7 @@ static ascc_status add_term(const ascc_whitened_term *term, const ascc_network_r
         return ASCC_ERROR_MEMORY;
     for (size_t i = 0; i < sizes.room; i++)
         sequence[i] = (uint32_t)i;
-    const size_t rows = run->hierarchy->set[layer->set].count;
+    const size_t rows = ascc_network_rows(run, layer->set);
     const size_t count = list_rows(run->value[term->layer + 2].active, rows, list);
     for (size_t at = 0; at < count; at += tile.n) {
         tile.list = list + at;

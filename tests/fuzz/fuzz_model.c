@@ -9,6 +9,7 @@
  *   'n'  the network of a file of libascc's own, whose tensors are right for the corpus
  *   'b'  the same of one in a basis, with transfers and BF16 tensors
  *   'p'  the same of one with set abstractions on farthest points
+ *   'g'  that of a graph network
  *   'd'  the architecture of a published DMCF network, likewise
  *   'c'  that of a published CConv network
  */
@@ -58,7 +59,9 @@ static void check_plan(const ascc_plan *plan)
 {
     for (int32_t i = 0; i < plan->layer_count; i++) {
         const ascc_layer *layer = &plan->layer[i];
-        fuzz_require(layer->set >= 0 && layer->set < ASCC_SET_LEVEL + plan->level_count - 1);
+        fuzz_require(layer->set >= 0 &&
+                     (layer->set < ASCC_SET_LEVEL + plan->level_count - 1 ||
+                      (layer->set == ASCC_SET_EDGES && plan->edge_radius > 0.0)));
         fuzz_require(layer->term_count > 0 && layer->channels > 0);
         for (int32_t t = layer->first_term; t < layer->first_term + layer->term_count; t++) {
             const ascc_term *term = &plan->term[t];
@@ -149,6 +152,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     case 'n':
     case 'b':
     case 'p':
+    case 'g':
     case 'd':
     case 'c':
         load_text(data + 1, size - 1, (char)data[0]);

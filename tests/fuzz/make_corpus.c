@@ -77,7 +77,7 @@ static void write_models(void)
         "{\"\\ud83d\\ude00\\u00e9\\n\":[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[]",
         "{\"a\":[1e308,-0.1e-320,123456789012345678901234567890,5e-324,true,false,null]}",
     };
-    static const char kinds[] = {'n', 'b', 'p', 'd', 'c'};
+    static const char kinds[] = {'n', 'b', 'p', 'g', 'd', 'c'};
     const model_random tiny = {.channels = 4, .cells = 1, .output_cells = 2, .trunk_layers = 1};
     const model_random farthest = {.levels = 2,
                                    .channels = 4,
@@ -86,6 +86,7 @@ static void write_models(void)
                                    .method = "farthest",
                                    .half_axis = "x",
                                    .plain = 1};
+    const model_random graph = {.channels = 4, .graph = 1, .plain = 1, .radius = 1.45};
     for (int i = 0; i < 2; i++) {
         const char kind = "fh"[i];
         char name[32];
@@ -95,6 +96,9 @@ static void write_models(void)
         write_file("model", name, kind, bytes, size);
         bytes = model_builder_random(&farthest, &size);
         snprintf(name, sizeof name, "farthest-%c", kind);
+        write_file("model", name, kind, bytes, size);
+        bytes = model_builder_random(&graph, &size);
+        snprintf(name, sizeof name, "graph-%c", kind);
         write_file("model", name, kind, bytes, size);
         bytes = model_builder_cconv(NULL, NULL, &size);
         snprintf(name, sizeof name, "cconv-%c", kind);

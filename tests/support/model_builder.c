@@ -279,6 +279,7 @@ typedef struct random_network {
     model_text text;
     uint64_t state;
     int terms; /* of the layer being written */
+    int graph_layers;
 } random_network;
 
 /* window NULL: the output's. */
@@ -530,6 +531,104 @@ static void add_trunk_layer(random_network *n, int layer)
     }
 }
 
+/* ---- A graph network ---- */
+
+static void open_graph_layer(random_network *n, const char *name, const char *points, int channels)
+{
+    model_text_add(&n->text, "%s{\"name\":\"%s\",\"points\":\"%s\",\"channels\":%d,\"terms\":[",
+                   n->graph_layers++ ? "]}," : "", name, points, channels);
+    n->terms = 0;
+}
+
+static void add_plain_term(random_network *n, const char *type, const char *source,
+                           const char *members)
+{
+    model_text_add(&n->text, "%s{\"type\":\"%s\",\"source\":\"%s\"%s}", n->terms++ ? "," : "", type,
+                   source, members);
+}
+
+static void add_normalize(random_network *n, const char *name, const char *source)
+{
+    const size_t c = (size_t)n->o.channels;
+    char members[128], tensor[64];
+    snprintf(members, sizeof members, ",\"scale\":\"%s.scale\",\"offset\":\"%s.offset\"", name,
+             name);
+    add_plain_term(n, "normalize", source, members);
+    snprintf(tensor, sizeof tensor, "%s.scale", name);
+    add_random(&n->builder, &n->state, tensor, 1, &c, 1.0);
+    snprintf(tensor, sizeof tensor, "%s.offset", name);
+    add_random(&n->builder, &n->state, tensor, 1, &c, 0.1);
+}
+
+/* The second matrix of a perceptron and its normalisation: layers NAMEx and, still open, NAME. */
+static void add_second(random_network *n, const char *hidden, const char *name, const char *points)
+{
+    const int c = n->o.channels;
+    char last[32];
+    snprintf(last, sizeof last, "%sx", name);
+    open_graph_layer(n, last, points, c);
+    add_dense(n, last, hidden, 1, 0, c, c);
+    open_graph_layer(n, name, points, c);
+    add_normalize(n, name, last);
+}
+
+static void add_message_passing(random_network *n, int step, const char *points)
+{
+    const int c = n->o.channels;
+    char node[16], edge[16], name[7][16], node_name[24];
+    for (int i = 0; i < 7; i++)
+        snprintf(name[i], sizeof name[i], "%c%d", "srhmaun"[i], step);
+    snprintf(node, sizeof node, "n%d", step - 1);
+    snprintf(edge, sizeof edge, "e%d", step - 1);
+    open_graph_layer(n, name[0], points, c);
+    add_dense(n, name[0], node, 0, 0, c, c);
+    open_graph_layer(n, name[1], points, c);
+    add_dense(n, name[1], node, 0, 0, c, c);
+    open_graph_layer(n, name[2], "edges", c);
+    add_plain_term(n, "gather", name[0], ",\"end\":\"sender\"");
+    add_plain_term(n, "gather", name[1], ",\"end\":\"receiver\"");
+    add_dense(n, name[2], edge, 0, 0, c, c);
+    add_second(n, name[2], name[3], "edges");
+    open_graph_layer(n, name[4], points, c);
+    add_plain_term(n, "sum", name[3], step % 2 ? "" : ",\"relu\":true");
+    open_graph_layer(n, name[5], points, c);
+    snprintf(node_name, sizeof node_name, "u%d.node", step);
+    add_dense(n, node_name, node, 0, 0, c, c);
+    add_dense(n, name[5], name[4], 0, 0, c, c);
+    add_second(n, name[5], name[6], points);
+    add_plain_term(n, "identity", node, "");
+    snprintf(edge, sizeof edge, "e%d", step);
+    open_graph_layer(n, edge, "edges", c);
+    snprintf(edge, sizeof edge, "e%d", step - 1);
+    add_plain_term(n, "identity", edge, "");
+    add_plain_term(n, "identity", name[3], "");
+}
+
+static void add_graph(random_network *n)
+{
+    const int d = n->o.dimension, c = n->o.channels;
+    const char *points = n->o.fluid_only ? "fluid" : "all";
+    char last[16];
+    open_graph_layer(n, "i", points, c);
+    add_dense(n, "i.fluid", "fluid", 0, 0, 1 + d, c);
+    if (!n->o.fluid_only)
+        add_dense(n, "i.boundary", "boundary", 0, 0, 1 + d, c);
+    add_second(n, "i", "n0", points);
+    open_graph_layer(n, "way", "edges", d + 1);
+    add_plain_term(n, "displacement", "fluid", "");
+    open_graph_layer(n, "j", "edges", c);
+    add_dense(n, "j", "way", 0, 0, d + 1, c);
+    add_second(n, "j", "e0", "edges");
+    for (int step = 1; step <= n->o.graph; step++)
+        add_message_passing(n, step, points);
+    snprintf(last, sizeof last, "n%d", n->o.graph);
+    open_graph_layer(n, "k", points, c);
+    add_dense(n, "k", last, 0, 0, c, c);
+    open_graph_layer(n, "l0.0", points, d);
+    add_dense(n, "l0.0", "k", 1, 0, c, d);
+    model_text_add(&n->text, "]}");
+}
+
 static void add_head(random_network *n)
 {
     const model_random *o = &n->o;
@@ -551,6 +650,9 @@ static void add_head(random_network *n)
                        model_number(o->boundary_crop * o->spacing));
     if (o->relaxation)
         model_text_add(&n->text, ",\"relaxation\":%s", o->relaxation);
+    if (o->graph)
+        model_text_add(&n->text, ",\"edges\":{\"points\":\"%s\",\"radius\":%s}",
+                       o->fluid_only ? "fluid" : "all", model_number(o->radius * o->spacing));
     if (o->levels == 1)
         return;
     const int farthest = strcmp(o->method, "farthest") == 0;
@@ -649,12 +751,16 @@ static unsigned char *random_file(const model_random *options, const char *netwo
     n.builder.coarse = o->coarse;
     add_head(&n);
     model_text_add(&n.text, ",\"layers\":[");
-    if (o->moments)
+    if (o->graph)
+        add_graph(&n);
+    else if (o->moments)
         add_moments(&n);
     else if (o->abstraction)
         add_hourglass(&n);
     else
         add_first_layer(&n);
+    if (o->graph)
+        o->trunk_layers = 0;
     for (int layer = 1; layer <= o->trunk_layers; layer++)
         add_trunk_layer(&n, layer);
     if (o->guess) {
@@ -884,9 +990,14 @@ static const model_random small_hourglass = {.levels = 2,
                                              .abstraction = 1 + 2 + 16 + 32,
                                              .plain = 1};
 
+static const model_random small_graph = {.channels = 4, .graph = 1, .plain = 1, .radius = 1.45};
+
 static const model_random *small_of(char kind)
 {
-    return kind == 'b' ? &small_basis : kind == 'p' ? &small_hourglass : &small;
+    return kind == 'b'   ? &small_basis
+           : kind == 'p' ? &small_hourglass
+           : kind == 'g' ? &small_graph
+                         : &small;
 }
 
 unsigned char *model_builder_described(char kind, const char *text, size_t *size)

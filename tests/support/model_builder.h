@@ -89,8 +89,9 @@ typedef struct model_random {
      * bit 0: this; 1: relative; 2: means in the first, 3: in the second; 4: of the 8 nearest there; 5: a matrix
      * after the interpolation; 6: farthest points of the fluid alone. */
     int abstraction;
-    int area;               /* 1: the boundary's feature area in place of one */
-    int guess;              /* 1: a layer "guess" of one channel for the relaxation */
+    int area;  /* 1: the boundary's feature area in place of one */
+    int graph; /* steps of message passing on a graph, in place of convolutions; plain */
+    int guess; /* 1: a layer "guess" of one channel for the relaxation */
     const char *relaxation; /* JSON object; NULL = none */
     int direction; /* 1: the last layer's pairs act along their present line; bumps, fluid_only */
     int down;      /* 1: gravity besides, where residuals are */
@@ -112,7 +113,7 @@ unsigned char *model_builder_dmcf(const char *from, const char *to, size_t *size
 unsigned char *model_builder_cconv(const char *from, const char *to, size_t *size);
 
 /* For fuzzing: a file with the tensors of a small network and another description of it. kind 'n':
- * own format, two levels; 'b': the same in a basis; 'p': set abstractions; 'd', 'c': published. model_builder_description gives the right one, which
+ * own format, two levels; 'b': the same in a basis; 'p': set abstractions; 'g': a graph network; 'd', 'c': published. model_builder_description gives the right one, which
  * is the caller's to free. */
 unsigned char *model_builder_described(char kind, const char *text, size_t *size);
 char *model_builder_description(char kind);

@@ -367,10 +367,17 @@ typedef struct values {
     double *row; /* [set count][channels] */
 } values;
 
+/* From a point to another within the radius of edges; both may be one. */
+typedef struct edge {
+    size_t sender, receiver;
+} edge;
+
 typedef struct network_state {
     const oracle *o;
     const oracle_record *sets;
     values *value;
+    edge *edges;
+    size_t edge_count;
 } network_state;
 
 static double weight_at(const oracle *o, const float *pointer, size_t index)
@@ -457,6 +464,55 @@ static double displacement(const point *to, const point *from, double d[3])
         square += d[c] * d[c];
     }
     return sqrt(square);
+}
+
+/* ---- Edges ---- */
+
+static void find_edges(network_state *n)
+{
+    const ascc_plan *plan = &n->o->model->plan;
+    const point_set *set = &n->sets->set[plan->edge_set];
+    double d[3];
+    n->edges = take(plan->edge_radius > 0.0 ? set->count * set->count : 0, sizeof *n->edges);
+    for (size_t i = 0; plan->edge_radius > 0.0 && i < set->count; i++)
+        for (size_t j = 0; j < set->count; j++)
+            if (displacement(&set->point[j], &set->point[i], d) <= plan->edge_radius)
+                n->edges[n->edge_count++] = (edge){.sender = j, .receiver = i};
+}
+
+static size_t rows_of(const network_state *n, int32_t set)
+{
+    return set == ASCC_SET_EDGES ? n->edge_count : n->sets->set[set].count;
+}
+
+static void add_displacement(const network_state *n, size_t row, double *out)
+{
+    const ascc_plan *plan = &n->o->model->plan;
+    const point *at = n->sets->set[plan->edge_set].point;
+    double d[3];
+    out[plan->dimension] +=
+        displacement(&at[n->edges[row].sender], &at[n->edges[row].receiver], d) / plan->edge_radius;
+    for (int32_t c = 0; c < plan->dimension; c++)
+        out[c] += d[c] / plan->edge_radius;
+}
+
+static void sum_edges(const network_state *n, const ascc_term *term, size_t row, double *out)
+{
+    for (size_t e = 0; e < n->edge_count; e++)
+        for (int32_t a = 0; n->edges[e].receiver == row && a < term->inputs; a++)
+            out[a] += read_value(n, term->source, term->rectify != 0, e, a);
+}
+
+static void normalize(const network_state *n, const ascc_term *term, const double *in, double *out)
+{
+    double mean = 0.0, variance = 0.0;
+    for (int32_t a = 0; a < term->inputs; a++)
+        mean += in[a] / term->inputs;
+    for (int32_t a = 0; a < term->inputs; a++)
+        variance += (in[a] - mean) * (in[a] - mean) / term->inputs;
+    for (int32_t a = 0; a < term->inputs; a++)
+        out[a] += (in[a] - mean) / sqrt(variance + 1e-5) *
+                  weight_at(n->o, term->tensor[ASCC_TENSOR_WEIGHT], (size_t)a);
 }
 
 static void convolve(const network_state *n, const ascc_layer *layer, const ascc_term *term,
@@ -725,9 +781,16 @@ static void add_term(const network_state *n, const ascc_layer *layer, const ascc
                      size_t row, double *out)
 {
     size_t from = 0;
-    if (!searches(term) && !shared_row(n, n->value[term->source].set, layer->set, row, &from))
+    if (!searches(term) && term->operation != &ascc_op_sum &&
+        !shared_row(n, n->value[term->source].set, layer->set, row, &from))
         return;
-    if (term->operation == &ascc_op_grid || term->operation == &ascc_op_basis) {
+    if (term->operation == &ascc_op_gather)
+        from = term->option[0] == ASCC_END_SENDER ? n->edges[row].sender : n->edges[row].receiver;
+    if (term->operation == &ascc_op_displacement) {
+        add_displacement(n, row, out);
+    } else if (term->operation == &ascc_op_sum) {
+        sum_edges(n, term, row, out);
+    } else if (term->operation == &ascc_op_grid || term->operation == &ascc_op_basis) {
         convolve(n, layer, term, row, out);
     } else if (term->operation == &ascc_op_stencil) {
         stencil(n, layer, term, row, out);
@@ -744,13 +807,17 @@ static void add_term(const network_state *n, const ascc_layer *layer, const ascc
         double *in = take((size_t)term->inputs, sizeof *in);
         for (int32_t a = 0; a < term->inputs; a++)
             in[a] = read_value(n, term->source, term->rectify != 0, from, a);
+        const bool adds =
+            term->operation == &ascc_op_identity || term->operation == &ascc_op_gather;
         if (term->operation == &ascc_op_dense)
             add_product(n, term, 0, in, out);
         else if (term->operation == &ascc_op_gravity)
             add_gravity(n, term, out);
-        else if (term->operation != &ascc_op_identity)
+        else if (term->operation == &ascc_op_normalize)
+            normalize(n, term, in, out);
+        else if (!adds)
             n->o->add_other(term, in, out);
-        for (int32_t a = 0; term->operation == &ascc_op_identity && a < term->inputs; a++)
+        for (int32_t a = 0; adds && a < term->inputs; a++)
             out[a] += in[a];
         free(in);
     }
@@ -760,7 +827,7 @@ static void add_term(const network_state *n, const ascc_layer *layer, const ascc
 
 static values make_values(const network_state *n, int32_t set, int32_t channels)
 {
-    const size_t count = n->sets->set[set].count;
+    const size_t count = rows_of(n, set);
     return (values){set, channels, take(count * (size_t)channels, sizeof(double))};
 }
 
@@ -770,7 +837,7 @@ static void run_layer(network_state *n, int32_t l)
     const ascc_layer *layer = &plan->layer[l];
     values *v = &n->value[l + 2];
     *v = make_values(n, layer->set, layer->channels);
-    for (size_t row = 0; row < n->sets->set[layer->set].count; row++)
+    for (size_t row = 0; row < rows_of(n, layer->set); row++)
         for (int32_t t = layer->first_term; t < layer->first_term + layer->term_count; t++)
             add_term(n, layer, &plan->term[t], row,
                      v->row + row * (size_t)layer->channels + plan->term[t].column);
@@ -817,6 +884,7 @@ static void run_layers(network_state *n, const double *velocity)
     const oracle *o = n->o;
     const ascc_plan *plan = &o->model->plan;
     const size_t d = (size_t)plan->dimension;
+    find_edges(n);
     n->value[0] = make_values(n, ASCC_SET_FLUID, plan->fluid_channels);
     n->value[1] = make_values(n, ASCC_SET_BOUNDARY, plan->boundary_channels);
     for (size_t i = 0; i < o->fluid_count; i++)
@@ -1003,7 +1071,8 @@ void oracle_step(oracle *o, double *position, double *velocity, double *correcti
                                      : dt * 0.5 * (velocity[k] + after[k]));
     }
     oracle_record *sets = build_sets(o, position, seen);
-    network_state n = {o, sets, take((size_t)plan->layer_count + 2, sizeof(values))};
+    network_state n = {
+        .o = o, .sets = sets, .value = take((size_t)plan->layer_count + 2, sizeof(values))};
     run_layers(&n, after);
     run_output(&n, moved);
     for (size_t k = 0; k < numbers; k++) {
@@ -1019,6 +1088,7 @@ void oracle_step(oracle *o, double *position, double *velocity, double *correcti
     for (int32_t v = 0; v < plan->layer_count + 2; v++)
         free(n.value[v].row);
     free(n.value);
+    free(n.edges);
     free(before);
     free(moved);
     free(seen);
