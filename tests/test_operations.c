@@ -485,6 +485,31 @@ static void check_gradients(const recipe *from, int variant, bench *b, const res
            check_slopes(b, b->velocity, numbers, 1e-4, double_at, r->by_velocity), worst);
 }
 
+/* Weights packed and transposed fill what an operation says they take up, and not a float more. */
+static void check_packing(const ascc_plan *plan)
+{
+    enum { MORE = 8192 };
+    for (int32_t t = 0; t <= plan->term_count; t++) {
+        const ascc_term *term = ascc_plan_term(plan, t);
+        const ascc_operation *operation = term->operation;
+        const size_t size = operation->packed_size ? operation->packed_size(plan, term) : 0;
+        float *packed = calloc(size + MORE, sizeof *packed);
+        float *transposed = calloc(size + MORE, sizeof *transposed);
+        assert_non_null(packed);
+        assert_non_null(transposed);
+        for (size_t i = 0; i < MORE; i++)
+            packed[size + i] = transposed[size + i] = -7.0f;
+        if (operation->pack && size)
+            operation->pack(plan, term, packed);
+        if (operation->transpose)
+            operation->transpose(plan, term, packed, transposed);
+        for (size_t i = 0; i < MORE; i++)
+            assert_true(packed[size + i] == -7.0f && transposed[size + i] == -7.0f);
+        free(transposed);
+        free(packed);
+    }
+}
+
 /* One variant: the first instruction set against the oracle, the others against the first, to the bit. */
 static void check_variant(const recipe *from, int variant, double worst[2])
 {
@@ -518,6 +543,7 @@ static void check_variant(const recipe *from, int variant, double worst[2])
             free(r.weight);
         } else {
             first = r;
+            check_packing(&model->plan);
             bench b = {.model = model, .s = &s, .weight = oracle_weights(model)};
             double after[MAX_POINTS * 3], correction[MAX_POINTS * 3], error = 0.0, largest = 0.0;
             memcpy(b.position, s.fluid, sizeof s.fluid);

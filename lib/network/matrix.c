@@ -48,7 +48,8 @@ void ascc_matrix_transpose(const ascc_plan *plan, const ascc_term *term, const f
                            float *to)
 {
     (void)plan;
-    ascc_transpose(packed, ascc_matrix_length(term), ascc_padded(term->outputs), to);
+    if (term->tensor[ASCC_TENSOR_WEIGHT])
+        ascc_transpose(packed, ascc_matrix_length(term), ascc_padded(term->outputs), to);
 }
 
 void ascc_matrix_back(const ascc_reverse *pass, const ascc_term *term, size_t n)
