@@ -303,6 +303,9 @@ run eval ballistic a.safetensors --json odd/link.json --csv odd/new.csv --no-rol
 report $? 'so are reports'
 holds 'to where they lead' sh -c '[ -L odd/link.json ] && grep -q runs real.json && grep -q figure odd/new.csv'
 chmod 604 real.json
+run eval ballistic a.safetensors --emd --csv emd.csv --quiet && grep -q '[,"]emd_final[,"]' emd.csv &&
+    ! grep -q sinkhorn emd.csv
+report $? "--emd measures the exact earth mover's distance alone"
 run eval ballistic a.safetensors --json real.json --no-rollout --quiet
 holds 'a file that is replaced keeps its mode' sh -c 'ls -l real.json | grep -q "^-rw----r--"'
 holds 'nothing is left beside' sh -c '[ -z "$(ls odd . | grep part)" ]'

@@ -43,6 +43,7 @@ static int usage(void)
           "  --frames A:B:STEP  start frames of one- and two-frame errors, B not included\n"
           "  --velocity KIND    stored or difference: velocities these start with (both)\n"
           "  --transport        earth mover's distances of the last frame too: minutes\n"
+          "  --emd              the exact one of these alone: seconds for a thousand particles\n"
           "  --no-rollout       one- and two-frame errors only\n"
           "  --quiet            no table\n",
           stdout);
@@ -89,11 +90,13 @@ static bool read_option(const char *name, const char *value, options *o)
 
 static bool read_arguments(int argc, char **argv, options *o)
 {
-    static const char *const names[] = {"--every",  "--threads",  "--json",      "--csv",
-                                        "--frames", "--velocity", "--transport", "--no-rollout",
-                                        "--quiet",  NULL};
+    static const char *const names[] = {"--every",      "--threads",  "--json",      "--csv",
+                                        "--frames",     "--velocity", "--transport", "--emd",
+                                        "--no-rollout", "--quiet",    NULL};
     for (int i = 0; i < argc; i++) {
-        if (strcmp(argv[i], "--transport") == 0)
+        if (strcmp(argv[i], "--emd") == 0)
+            o->measure.emd = true;
+        else if (strcmp(argv[i], "--transport") == 0)
             o->measure.transport = true;
         else if (strcmp(argv[i], "--quiet") == 0)
             o->quiet = true;

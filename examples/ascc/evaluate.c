@@ -415,17 +415,13 @@ static void measure_frame(bench *b, size_t frame, rollout *r)
     r->counted++;
 }
 
-static void measure_transport(bench *b)
+static void measure_emd(bench *b)
 {
     const ascc_truth *t = b->truth;
     const size_t n = t->scene.fluid_count, d = (size_t)t->scene.dimension;
     ascc_measure_set p = set_of(t, b->position, NULL);
     ascc_measure_set q = set_of(t, t->position + (t->frames - 1) * row_of(t), NULL);
-    const ascc_measure_sinkhorn_options sinkhorn = {.epsilon = 0.5 * t->scene.spacing,
-                                                    .threads = b->truth->scene.threads};
-    ascc_measure_sinkhorn_result result;
     double emd = NAN;
-    (void)ascc_measure_sinkhorn(&p, &q, &sinkhorn, &result);
     const size_t wanted = n > ASCC_MEASURE_EMD_LIMIT ? SUBSET : n;
     size_t *index = malloc((wanted + 1) * sizeof *index);
     double *copy = malloc(2 * wanted * d * sizeof *copy);
@@ -444,6 +440,17 @@ static void measure_transport(bench *b)
     free(copy);
     ascc_report_add(b->run, emd, "emd_final");
     ascc_report_add(b->run, (double)wanted, "emd_particles");
+}
+
+static void measure_sinkhorn(bench *b)
+{
+    const ascc_truth *t = b->truth;
+    const ascc_measure_set p = set_of(t, b->position, NULL);
+    const ascc_measure_set q = set_of(t, t->position + (t->frames - 1) * row_of(t), NULL);
+    const ascc_measure_sinkhorn_options sinkhorn = {.epsilon = 0.5 * t->scene.spacing,
+                                                    .threads = b->truth->scene.threads};
+    ascc_measure_sinkhorn_result result;
+    (void)ascc_measure_sinkhorn(&p, &q, &sinkhorn, &result);
     ascc_report_add(b->run, result.divergence, "sinkhorn_final");
     ascc_report_add(b->run, sinkhorn.epsilon, "sinkhorn_epsilon");
     ascc_report_add(b->run, result.residual, "sinkhorn_residual");
@@ -537,8 +544,10 @@ static void run_rollout(bench *b)
         snprintf(b->run->note, sizeof b->run->note, "stopped after frame %zu: %.200s", r.last,
                  why.text);
     report_rollout(b, &r);
+    if (going && (b->options->transport || b->options->emd))
+        measure_emd(b);
     if (going && b->options->transport)
-        measure_transport(b);
+        measure_sinkhorn(b);
 }
 
 static size_t frames_to_run(const ascc_evaluate_options *o, const ascc_truth *t)

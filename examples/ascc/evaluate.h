@@ -29,7 +29,8 @@ void ascc_truth_thin(ascc_truth *truth, size_t every);
 /** What to measure; zero, but velocity = -1, is everything but transport, as docs/measures.md says. */
 typedef struct ascc_evaluate_options {
     bool has_frames; /* start frames first, first + step, ... below end (< 0: the last) */
-    bool transport;  /* earth mover's distances of the last frame */
+    bool transport;  /* earth mover's distances of the last frame, exact and Sinkhorn's */
+    bool emd;        /* the exact one alone */
     bool no_rollout;
     long first, end, step;
     int velocity; /* an ascc_velocity_kind; -1 = both, as far as stored */
