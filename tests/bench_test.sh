@@ -1,7 +1,10 @@
 #!/bin/sh
-# The benchmarks run and write what docs/benchmarks.md says; prints TAP. $1: a build folder.
+# The benchmarks run and write what docs/benchmarks.md says, bench/tables its page; prints TAP. $1: a build folder.
 # SPDX-License-Identifier: MIT
+. "$(dirname "$0")/support/python.sh"
+python_with 'numpy, matplotlib' || python=
 cd "$(dirname "$0")/.." || exit 1
+root=$(pwd)
 bench=$(cd "${1:-build}" && pwd)/bench/bench
 if [ ! -x "$bench" ]; then
     echo "1..0 # SKIP built without the benchmarks"
@@ -48,5 +51,16 @@ report $? "a model that is not there is named"
 run kernel --cpu 64
 [ $? -eq 1 ] && grep -q 'this machine has only' out
 report $? "a CPU mask that the machine lacks is refused"
+if [ -n "$python" ]; then
+    MPLBACKEND=Agg "$python" -B "$root/tests/test_tables.py" >tap 2>&1 || failed=1
+    grep -q '^1\.\.[1-9]' tap || { echo "not ok - tests/test_tables.py runs"; sed 's/^/# /' tap; }
+    awk -v number="$number" '/^1\.\./ { next }
+        /^(not )?ok / { sub(/ok [0-9]+/, "ok " ++number) }
+        { print }' tap
+    number=$((number + $(grep -cE '^(not )?ok ' tap)))
+else
+    number=$((number + 1))
+    echo "ok $number - the tables' page is written # SKIP no Python with numpy and matplotlib"
+fi
 echo "1..$number"
 exit $failed
