@@ -739,6 +739,9 @@ static void points_of_shapes_cover_them_evenly(void **state)
                                         .radius = 0.27,
                                         .inset = inset * 0.02};
                     const double pitch = 0.64 * SPACING, sign = side ? -1 : 1;
+                    const double behind = inset  ? shape.inset
+                                          : side ? 0
+                                                 : (d == 2 ? 1.0 : 0.6) * SPACING;
                     int32_t body;
                     assert_int_equal(ascc_body_add(set, &shape, NULL, &body), ASCC_OK);
                     const size_t n = ascc_particles_count(set, ASCC_BOUNDARY);
@@ -747,8 +750,8 @@ static void points_of_shapes_cover_them_evenly(void **state)
                     read_field(set, ASCC_NORMAL, 0, n, normal);
                     ascc_shape moved = shape; /* the surface that points are on */
                     for (int c = 0; c < 3; c++)
-                        moved.half[c] -= kind == ASCC_SHAPE_CAPSULE ? 0 : sign * shape.inset;
-                    moved.radius -= sign * shape.inset;
+                        moved.half[c] -= kind == ASCC_SHAPE_CAPSULE ? 0 : sign * behind;
+                    moved.radius -= sign * behind;
                     const double whole = area(&moved, d) / pow(pitch, d - 1);
                     assert_true((double)n > 0.95 * whole && (double)n < 1.35 * whole + 8);
                     test_random random = {4};

@@ -186,6 +186,30 @@ static void handles(const ascc::context &context, const char *path)
     set.add_boundary(wall, normal, 9);
     fact(set.bodies() == std::vector<std::int32_t>{9, 9}, "bodies of walls");
     fact(set.body_impulse(9).impulse == std::array<std::int64_t, 3>{}, "no run, no impulse");
+    auto ball = ascc::sized<ascc_shape>();
+    ball.kind = ASCC_SHAPE_SPHERE;
+    ball.radius = 3 * moved.info().particle_spacing;
+    auto pose = ascc::sized<ascc_pose>();
+    pose.position[1] = 50.0;
+    pose.velocity[0] = 0.25;
+    const std::int32_t body = set.add_body(ball, pose);
+    step.run(set, 2);
+    const double way = 2 * moved.info().time_step * 0.25;
+    fact(std::abs(set.body(body).position[0] - way) < 1e-12, "a step carries a body along");
+    fact(set.body_numbers() == std::vector<std::int32_t>{10} && body == 10, "bodies have numbers");
+    fact(set.body_impulses({body})[0].impulse == std::array<std::int64_t, 3>{},
+         "no water, no push");
+    pose.position[0] = 1e3;
+    fact(thrown([&] { set.move_body(body, pose); }) == ASCC_ERROR_RANGE, "a jump is told");
+    set.remove_body(body);
+    fact(set.body_numbers().empty(), "a body is gone");
+    auto tap = ascc::sized<ascc_tap>();
+    tap.position[1] = 60.0;
+    const auto came = set.run_tap(tap, 1.0);
+    auto drain = ascc::sized<ascc_drain>();
+    drain.before = came.at(0) + 1;
+    fact(came.size() == 1 && set.run_drain(drain).back() == came[0] && set.count() == 0,
+         "what a tap lets in a drain takes out");
     set.clear(ASCC_BOUNDARY);
     set.resize_fluid(3);
     fact(set.count() == 3 && set.count(ASCC_BOUNDARY) == 0, "rows are dropped");

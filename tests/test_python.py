@@ -71,6 +71,11 @@ class Header(unittest.TestCase):
             "LadderOptions": "ascc_ladder_options",
             "LadderStatistics": "ascc_ladder_statistics",
             "Array": "ascc_array",
+            "Shape": "ascc_shape",
+            "Pose": "ascc_pose",
+            "BodyInfo": "ascc_body_info",
+            "Tap": "ascc_tap",
+            "Drain": "ascc_drain",
         }
         lines, wanted = [], []
         for python, c in names.items():
@@ -87,6 +92,9 @@ class Header(unittest.TestCase):
             (_library.Status, "ASCC_ERROR_"),
             (_library.Kind, "ASCC_"),
             (_library.Field, "ASCC_"),
+            (ascc.ShapeKind, "ASCC_SHAPE_"),
+            (ascc.Water, "ASCC_WATER_"),
+            (ascc.DrainKind, "ASCC_DRAIN_"),
         ):
             for item in enum:
                 name = "ASCC_OK" if item.name == "OK" else prefix + item.name
@@ -245,6 +253,40 @@ class Arrays(Case):
 
 
 class Sets(Case):
+    def test_bodies_are_carried_and_taps_and_drains_count(self):
+        h = self.set.spacing
+        ball = ascc.Shape(ascc.ShapeKind.SPHERE, radius=3 * h)
+        body = self.set.add_body(ball, ascc.Pose((0, 9), velocity=(0.5, 0), spin=(2.0,)))
+        square = [[0, 0], [0.5, 0], [0.5, 0.5], [0, 0.5]]
+        mesh = self.set.add_body(
+            ascc.Shape(ascc.ShapeKind.MESH, position=square, faces=[[0, 1], [1, 2], [2, 3], [3, 0]])
+        )
+        self.assertEqual(self.set.body_numbers, (body, mesh))
+        step = ascc.Step(self.model)
+        step.run(self.set, 3)
+        now = self.set.body(body)
+        self.assertAlmostEqual(now.pose.position[0], 1.5 * self.model.info.time_step, 12)
+        self.assertAlmostEqual(now.pose.angle, 6 * self.model.info.time_step, 12)
+        self.assertGreater(now.count, 5)
+        self.assertEqual([i.impulse for i in self.set.body_impulses([body, mesh])], [(0, 0, 0)] * 2)
+        self.set.move_body(body, now.pose)
+        with self.assertRaisesRegex(ascc.Error, "jump"):
+            self.set.move_body(body, ascc.Pose((99, 0)))
+        with self.assertRaisesRegex(ascc.Error, "none has the number 77"):
+            self.set.body(77)
+        with self.assertRaises(ValueError):
+            self.set.add_body(ascc.Shape(ascc.ShapeKind.BOX, (h, h), open=["up"]))
+        self.set.remove_body(body)
+        self.assertEqual(self.set.body_numbers, (mesh,))
+        before = len(self.set.ids())
+        tap = ascc.Tap((5, 5), velocity=(0, -1), radius=2 * h)
+        came = self.set.run_tap(tap, 0.1)
+        self.assertEqual((len(came), tap.emitted), (5, 5))
+        self.assertEqual(len(self.set.run_tap(tap, 0.1)), 0)
+        gone = self.set.run_drain(ascc.Drain(ascc.DrainKind.SPHERE, (5, 5), radius=2.5 * h))
+        self.assertEqual(list(gone), list(came))
+        self.assertEqual(len(self.set.ids()), before)
+
     def test_particles_come_go_and_are_found(self):
         ids = self.set.add_fluid(ascc.block((0, 0), (4, 2), 0.01))
         walls = self.set.add_boundary([[0, 0], [1, 0]], (0, 1), body=7)
@@ -270,7 +312,7 @@ class Sets(Case):
                 call(-1)
             with self.assertRaises((ValueError, OverflowError)):
                 call(2**64)
-        self.fails(ascc.Status.ARGUMENT, self.set.set, BOUNDARY, VELOCITY, [[0, 0]])
+        self.fails(ascc.Status.ARGUMENT, self.set.set, BOUNDARY, MASS, [1])
 
     def test_a_snapshot_is_the_state(self):
         self.set.add_fluid(ascc.block((0, 0), (8, 8), self.set.spacing), (1, 0))

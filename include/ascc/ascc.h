@@ -495,7 +495,10 @@ typedef struct ascc_shape {
     double half[3]; /* half extents, > 0 where the kind has them */
     double radius;  /* > 0 where the kind has one */
     double pitch;   /* from point to point at most; 0 = 0.64 particle spacings (docs/walls.md) */
-    double inset;   /* how far behind the surface points lie, seen from the water; 0 = on it */
+    /* How far behind the surface points lie, seen from the water. 0 = for boxes, spheres, capsules and cylinders
+     * with water outside a particle spacing in 2D and 0.6 in 3D (at most half of the least extent), so that they
+     * displace as much as they should (docs/bodies.md); on the surface for all else. */
+    double inset;
     uint32_t
         open; /* box: bit 2 c = without the face at -half[c], bit 2 c + 1 = without that at +half[c] */
     int32_t reserved; /* 0, else ARGUMENT */
@@ -582,6 +585,69 @@ ASCC_API size_t ascc_bodies_list(const ascc_particles *particles, size_t capacit
 ASCC_API ascc_status ascc_bodies_impulse(const ascc_particles *particles, size_t count,
                                          const int32_t *bodies, int64_t (*impulse)[3],
                                          double (*torque)[3]);
+
+/* ---- Taps and drains: fluid that comes and goes ------------------------------------------------ */
+
+/**
+ * Where fluid comes in. The host's own, kept from call to call: `owed` and `emitted` are what a tap remembers (copy
+ * them with the scene), all the rest may be changed at any time. Zero in a member is its default.
+ */
+typedef struct ascc_tap {
+    size_t size;        /* sizeof(ascc_tap) */
+    double position[3]; /* of the middle of its mouth, length unit */
+    double radius;      /* of the mouth, a disc (in 2D a line) across the velocity; 0 = a box */
+    double half[3];     /* half extents of the box, along the world's axes */
+    double velocity[3]; /* of what comes out, length unit / s; of a disc not 0 */
+    double rate;        /* particles / s, at most; 0 = as many as there is room for */
+    double pitch;       /* from place to place in the mouth; 0 = a particle spacing */
+    double
+        clearance; /* nothing comes out nearer to fluid, nor nearer than half of it to walls; 0 = 0.9 spacings */
+    double mass; /* kg, of a particle; 0 = the set's */
+    double owed; /* particles that the rate has allowed and no room was for, at most one a place */
+    uint64_t emitted; /* in all */
+} ascc_tap;
+
+/**
+ * Lets out what is due after some seconds, as far as there is room: call it before each run with what that run takes.
+ * The mouth is full of places a pitch apart; each gives a particle once the fluid before it is far enough away.
+ *
+ * ids       uint64_t[capacity], receives the ids of new particles; NULL if not wanted (capacity is not read then).
+ *           No more than capacity come out; what is owed comes later.
+ * count     receives how many came out
+ * errors    ARGUMENT, NOT_FINITE, RANGE (over 2^20 places; as ascc_particles_add_fluid), MEMORY; the message names the
+ *           member; on error nothing came out and the tap is as it was.
+ * cost      O(fluid + boundary + places times particles near the mouth).
+ */
+ASCC_API ascc_status ascc_tap_run(ascc_particles *particles, ascc_tap *tap, double seconds,
+                                  size_t capacity, uint64_t *ids, size_t *count);
+
+/** Where a drain takes fluid. */
+typedef enum ascc_drain_kind {
+    ASCC_DRAIN_ALL = 0,        /* everywhere: with `before`, by age */
+    ASCC_DRAIN_BOX = 1,        /* within `half` of `position` along each axis */
+    ASCC_DRAIN_SPHERE = 2,     /* within `radius` of `position` */
+    ASCC_DRAIN_HALF_SPACE = 3, /* on the side of `position` that `normal` points to */
+} ascc_drain_kind;
+
+typedef struct ascc_drain {
+    size_t size; /* sizeof(ascc_drain) */
+    ascc_drain_kind kind;
+    int32_t outside; /* 1: outside of the shape in place of inside: what has left the scene */
+    double position[3], half[3], radius, normal[3]; /* length unit; a normal of any length but 0 */
+    uint64_t before; /* only particles with an id below, which are older; 0 = of any age */
+} ascc_drain;
+
+/**
+ * Removes the fluid that a drain takes; the others keep their order.
+ *
+ * ids       uint64_t[capacity], receives the ids of those removed, ascending; the oldest `capacity` are removed and the
+ *           rest at the next call. NULL: all are removed, and capacity is not read.
+ * count     receives how many were removed; NULL if not wanted
+ * errors    ARGUMENT, NOT_FINITE, MEMORY; the message names the member; on error nothing was removed.
+ * cost      O(fluid).
+ */
+ASCC_API ascc_status ascc_drain_run(ascc_particles *particles, const ascc_drain *drain,
+                                    size_t capacity, uint64_t *ids, size_t *count);
 
 /* ---- Step: a model bound to the scratch memory it needs to advance particles ------------------ */
 

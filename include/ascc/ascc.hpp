@@ -493,6 +493,71 @@ class particles
         context_.check(ascc_particles_total_momentum(get(), total.data()));
         return total;
     }
+
+    /// Adds a body; returns its number. Shape and pose begin with their size: ascc::sized makes them.
+    std::int32_t add_body(const ascc_shape &shape, const ascc_pose *pose = nullptr)
+    {
+        std::int32_t body = -1;
+        check(ascc_body_add(get(), &shape, pose, &body));
+        return body;
+    }
+    std::int32_t add_body(const ascc_shape &shape, const ascc_pose &pose)
+    {
+        return add_body(shape, &pose);
+    }
+    void move_body(std::int32_t body, const ascc_pose &pose)
+    {
+        check(ascc_body_move(get(), body, &pose));
+    }
+    void remove_body(std::int32_t body)
+    {
+        check(ascc_body_remove(get(), body));
+    }
+    ascc_body_info body(std::int32_t body) const
+    {
+        auto info = sized<ascc_body_info>();
+        context_.check(ascc_body_get(get(), body, &info));
+        return info;
+    }
+    /// Numbers of all bodies that have a frame.
+    std::vector<std::int32_t> body_numbers() const
+    {
+        std::vector<std::int32_t> all(ascc_bodies_list(get(), 0, nullptr));
+        ascc_bodies_list(get(), all.size(), all.data());
+        return all;
+    }
+    /// What the last run gave to each of these bodies, with torques about their origins.
+    std::vector<ascc::body_impulse> body_impulses(const std::vector<std::int32_t> &bodies) const
+    {
+        std::vector<std::array<std::int64_t, 3>> impulses(bodies.size());
+        std::vector<std::array<double, 3>> torques(bodies.size());
+        context_.check(ascc_bodies_impulse(get(), bodies.size(), bodies.data(),
+                                           reinterpret_cast<std::int64_t(*)[3]>(impulses.data()),
+                                           reinterpret_cast<double(*)[3]>(torques.data())));
+        std::vector<ascc::body_impulse> all(bodies.size());
+        for (std::size_t i = 0; i < all.size(); i++)
+            all[i] = {impulses[i], torques[i]};
+        return all;
+    }
+    /// Lets out what is due; returns the ids of what came.
+    std::vector<std::uint64_t> run_tap(ascc_tap &tap, double seconds)
+    {
+        const std::size_t before = count();
+        std::size_t came = 0;
+        check(ascc_tap_run(get(), &tap, seconds, 0, nullptr, &came));
+        std::vector<std::uint64_t> ids(came);
+        check(ascc_particles_get_ids(get(), ASCC_FLUID, before, came, ids.data()));
+        return ids;
+    }
+    /// Removes what a drain takes; returns the ids of what is gone.
+    std::vector<std::uint64_t> run_drain(const ascc_drain &drain)
+    {
+        std::vector<std::uint64_t> ids(count() + 1);
+        std::size_t gone = 0;
+        check(ascc_drain_run(get(), &drain, ids.size(), ids.data(), &gone));
+        ids.resize(gone);
+        return ids;
+    }
     ascc::body_impulse body_impulse(std::int32_t body = -1,
                                     const std::array<double, 3> &point = {}) const
     {

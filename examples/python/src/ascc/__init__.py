@@ -23,6 +23,7 @@ threads  Calls run without the interpreter's lock. A particle set and a step ser
 life     Handles are freed with their objects, or earlier by close() or `with`.
 """
 
+from ._bodies import Body, Drain, DrainKind, Pose, Shape, ShapeKind, Tap, Water
 from ._ladder import Ladder, LadderStatistics
 from ._library import Field, Kind, LadderReason, Status, version
 from ._objects import (
@@ -45,9 +46,12 @@ POSITION, VELOCITY, MASS, NORMAL = Field.POSITION, Field.VELOCITY, Field.MASS, F
 __version__ = "0.1.0"
 __all__ = [
     "BOUNDARY",
+    "Body",
     "BodyImpulse",
     "Compression",
     "Context",
+    "Drain",
+    "DrainKind",
     "Error",
     "FLUID",
     "Field",
@@ -62,10 +66,15 @@ __all__ = [
     "NORMAL",
     "POSITION",
     "Particles",
+    "Pose",
+    "Shape",
+    "ShapeKind",
     "Statistics",
     "Status",
     "Step",
+    "Tap",
     "VELOCITY",
+    "Water",
     "block",
     "box",
     "surface",

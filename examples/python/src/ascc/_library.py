@@ -131,6 +131,79 @@ class ParticlesOptions(Sized):
     ]
 
 
+class Shape(Sized):
+    _fields_ = [
+        ("size", c_size_t),
+        ("kind", ctypes.c_int),
+        ("water", ctypes.c_int),
+        ("half", c_double * 3),
+        ("radius", c_double),
+        ("pitch", c_double),
+        ("inset", c_double),
+        ("open", c_uint32),
+        ("reserved", c_int32),
+        ("count", c_size_t),
+        ("position", ctypes.POINTER(Array)),
+        ("normal", ctypes.POINTER(Array)),
+        ("face_count", c_size_t),
+        ("faces", c_void_p),
+    ]
+
+
+class Pose(Sized):
+    _fields_ = [
+        ("size", c_size_t),
+        ("position", c_double * 3),
+        ("rotation", c_double * 4),
+        ("angle", c_double),
+        ("velocity", c_double * 3),
+        ("spin", c_double * 3),
+        ("jump", c_double),
+    ]
+
+
+class BodyInfo(Sized):
+    _fields_ = [
+        ("size", c_size_t),
+        ("first", c_size_t),
+        ("count", c_size_t),
+        ("position", c_double * 3),
+        ("rotation", c_double * 4),
+        ("angle", c_double),
+        ("velocity", c_double * 3),
+        ("spin", c_double * 3),
+    ]
+
+
+class Tap(Sized):
+    _fields_ = [
+        ("size", c_size_t),
+        ("position", c_double * 3),
+        ("radius", c_double),
+        ("half", c_double * 3),
+        ("velocity", c_double * 3),
+        ("rate", c_double),
+        ("pitch", c_double),
+        ("clearance", c_double),
+        ("mass", c_double),
+        ("owed", c_double),
+        ("emitted", c_uint64),
+    ]
+
+
+class Drain(Sized):
+    _fields_ = [
+        ("size", c_size_t),
+        ("kind", ctypes.c_int),
+        ("outside", c_int32),
+        ("position", c_double * 3),
+        ("half", c_double * 3),
+        ("radius", c_double),
+        ("normal", c_double * 3),
+        ("before", c_uint64),
+    ]
+
+
 class Measures(Sized):
     _fields_ = [
         ("size", c_size_t),
@@ -283,6 +356,14 @@ _FUNCTIONS: Dict[str, Tuple[Any, List[Any]]] = {
     "particles_hash": (c_uint64, [c_void_p]),
     "particles_message": (c_char_p, [c_void_p]),
     "particles_measure": (_INT, [c_void_p, ctypes.POINTER(Measures)]),
+    "body_add": (_INT, [c_void_p, ctypes.POINTER(Shape), ctypes.POINTER(Pose), c_void_p]),
+    "body_move": (_INT, [c_void_p, c_int32, ctypes.POINTER(Pose)]),
+    "body_get": (_INT, [c_void_p, c_int32, ctypes.POINTER(BodyInfo)]),
+    "body_remove": (_INT, [c_void_p, c_int32]),
+    "bodies_list": (c_size_t, [c_void_p, c_size_t, c_void_p]),
+    "bodies_impulse": (_INT, [c_void_p, c_size_t, c_void_p, c_void_p, c_void_p]),
+    "tap_run": (_INT, [c_void_p, ctypes.POINTER(Tap), c_double, c_size_t, c_void_p, _SIZE]),
+    "drain_run": (_INT, [c_void_p, ctypes.POINTER(Drain), c_size_t, c_void_p, _SIZE]),
     "step_create": (_INT, [c_void_p, c_void_p, ctypes.POINTER(StepOptions), _OUT]),
     "step_destroy": (None, [_OUT]),
     "step_estimate": (c_size_t, [c_void_p, c_size_t, c_size_t]),

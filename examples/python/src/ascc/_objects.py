@@ -26,6 +26,7 @@ from numpy.typing import ArrayLike, DTypeLike, NDArray
 
 from . import _library
 from ._arrays import Numbers, borrowed, rows_for, rows_of, written
+from ._bodies import Body, Drain, Pose, Shape, Tap
 from ._library import Field, Kind, Status, library
 
 Vector = Tuple[float, float, float]
@@ -586,6 +587,104 @@ class Particles(_Handle):
                 )
             )
         return BodyImpulse((impulse[0], impulse[1], impulse[2]), (torque[0], torque[1], torque[2]))
+
+    # Bodies
+
+    def add_body(self, shape: Shape, pose: Optional[Pose] = None) -> int:
+        """Adds a solid with a frame of its own at the end of the boundary; returns its number."""
+        raw, kept = shape._raw(self.dimension)
+        where = None if pose is None else ctypes.byref(pose._raw(self.dimension))
+        body = ctypes.c_int32()
+        with self._guard:
+            self._check(library.body_add(self._handle, ctypes.byref(raw), where, ctypes.byref(body)))
+        del kept
+        return body.value
+
+    def move_body(self, body: int, pose: Pose) -> None:
+        """Says where a body is when the next step begins, and how it moves from then on."""
+        raw = pose._raw(self.dimension)
+        with self._guard:
+            self._check(library.body_move(self._handle, _int32("body", body), ctypes.byref(raw)))
+
+    def body(self, body: int) -> Body:
+        """Where a body is now, and which rows of the boundary are its points."""
+        info = _library.BodyInfo()
+        with self._guard:
+            self.context._check(
+                library.body_get(self._handle, _int32("body", body), ctypes.byref(info))
+            )
+        pose = Pose(
+            position=tuple(info.position),
+            rotation=tuple(info.rotation),
+            angle=info.angle,
+            velocity=tuple(info.velocity),
+            spin=tuple(info.spin),
+        )
+        return Body(int(info.first), int(info.count), pose)
+
+    def remove_body(self, body: int) -> None:
+        """Removes a body and its points."""
+        with self._guard:
+            self._check(library.body_remove(self._handle, _int32("body", body)))
+
+    @property
+    def body_numbers(self) -> Tuple[int, ...]:
+        """Of all bodies with a frame, ascending."""
+        with self._guard:
+            count = int(library.bodies_list(self._handle, 0, None))
+            numbers = (ctypes.c_int32 * max(count, 1))()
+            library.bodies_list(self._handle, count, numbers)
+        return tuple(numbers[:count])
+
+    def body_impulses(self, bodies: Sequence[int]) -> Tuple[BodyImpulse, ...]:
+        """What the last run gave to each of these bodies, with torques about their origins."""
+        count = len(bodies)
+        numbers = (ctypes.c_int32 * max(count, 1))(*(_int32("body", b) for b in bodies))
+        impulse = (ctypes.c_int64 * (3 * max(count, 1)))()
+        torque = (ctypes.c_double * (3 * max(count, 1)))()
+        with self._guard:
+            self.context._check(
+                library.bodies_impulse(self._handle, count, numbers, impulse, torque)
+            )
+        return tuple(
+            BodyImpulse(
+                (impulse[3 * b], impulse[3 * b + 1], impulse[3 * b + 2]),
+                (torque[3 * b], torque[3 * b + 1], torque[3 * b + 2]),
+            )
+            for b in range(count)
+        )
+
+    # Taps and drains
+
+    def run_tap(self, tap: Tap, seconds: float) -> Ids:
+        """Lets out what is due after some seconds, where there is room; returns the ids of what came."""
+        count = ctypes.c_size_t()
+        with self._guard:
+            first = int(library.particles_count(self._handle, Kind.FLUID))
+            self._check(
+                library.tap_run(
+                    self._handle, ctypes.byref(tap._raw), seconds, 0, None, ctypes.byref(count)
+                )
+            )
+            ids = np.empty(count.value, np.uint64)
+            self.context._check(
+                library.particles_get_ids(
+                    self._handle, Kind.FLUID, first, len(ids), ids.ctypes.data
+                )
+            )
+        return ids
+
+    def run_drain(self, drain: Drain) -> Ids:
+        """Removes the fluid that a drain takes; returns the ids of what is gone."""
+        raw, count = drain._struct(), ctypes.c_size_t()
+        with self._guard:
+            ids = np.empty(1 + int(library.particles_count(self._handle, Kind.FLUID)), np.uint64)
+            self._check(
+                library.drain_run(
+                    self._handle, ctypes.byref(raw), len(ids), ids.ctypes.data, ctypes.byref(count)
+                )
+            )
+        return ids[: count.value].copy()
 
     # The whole state
 
