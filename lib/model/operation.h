@@ -40,6 +40,7 @@ typedef struct ascc_scratch_sizes {
 struct ascc_initial;
 struct ascc_network_run;
 struct ascc_tile;
+struct ascc_column_functions;
 struct ascc_reverse;
 struct ascc_impulse_scale;
 struct ascc_impulses;
@@ -105,6 +106,8 @@ typedef struct ascc_operation {
     /* The columns of the tile's rows that its matrix multiplies, one after another in tile->column; returns how
      * many: rows that have no such term have none. NULL = it never has a matrix. */
     size_t (*columns)(const struct ascc_tile *tile, const ascc_term *term);
+    /* Of one whose columns are gathered from neighbours (network/column.h), else NULL. */
+    const struct ascc_column_functions *around;
     /* From the gradient of a tile to those of tensors, source and places. */
     void (*backward)(const struct ascc_reverse *pass, const ascc_layer *layer,
                      const ascc_term *term, const uint32_t *list, size_t n);

@@ -76,23 +76,23 @@ void ascc_column_look(ascc_neighborhood *around, const ascc_network_run *run, co
                      around->count, scratch, room);
 }
 
-size_t ascc_column_gather(const ascc_tile *tile, const ascc_term *term, ascc_gather_function gather)
+size_t ascc_column_gather(const ascc_tile *tile, const ascc_term *term)
 {
     const size_t stride = ascc_matrix_length(term) + ASCC_COLUMN_PADDING;
     ascc_neighborhood around;
     for (size_t r = 0; r < tile->n; r++) {
         ascc_column_look(&around, tile->run, term, tile->list[r], tile->scratch, tile->room,
                          tile->sequence);
-        gather(tile->run, term, &around, tile->column + r * stride);
+        term->operation->around->gather(tile->run, term, &around, tile->column + r * stride);
     }
     return tile->n;
 }
 
-void ascc_column_forward(const ascc_tile *tile, const ascc_term *term, ascc_gather_function gather)
+void ascc_column_forward(const ascc_tile *tile, const ascc_term *term)
 {
     const ascc_network_run *run = tile->run;
     const size_t length = ascc_matrix_length(term), stride = length + ASCC_COLUMN_PADDING;
-    (void)ascc_column_gather(tile, term, gather);
+    (void)ascc_column_gather(tile, term);
     for (size_t r = 0; r < tile->n; r++) {
         float *to = tile->sum + r * tile->width + term->column;
         ascc_matrix_add_bias(run, term, to);
@@ -127,24 +127,24 @@ static void scatter_relative(const ascc_reverse *pass, const ascc_term *term,
 }
 
 static void scatter_row(const ascc_reverse *pass, const ascc_term *term,
-                        const ascc_neighborhood *around, size_t row, const float *column_gradient,
-                        ascc_scatter_function scatter)
+                        const ascc_neighborhood *around, size_t row, const float *column_gradient)
 {
     if (!around->relative) {
-        scatter(pass, term, around, around->neighbor, column_gradient,
-                ascc_reverse_source(pass, term));
+        term->operation->around->scatter(pass, term, around, around->neighbor, column_gradient,
+                                         ascc_reverse_source(pass, term));
         return;
     }
     /* the features there have been used */
     memset(around->relative, 0, around->count * ascc_padded(term->inputs) * sizeof(float));
-    scatter(pass, term, around, pass->sequence, column_gradient, around->relative);
+    term->operation->around->scatter(pass, term, around, pass->sequence, column_gradient,
+                                     around->relative);
     scatter_relative(pass, term, around, row);
 }
 
-void ascc_column_backward(const ascc_reverse *pass, const ascc_term *term, const uint32_t *list,
-                          size_t n, ascc_gather_function gather, ascc_scatter_function scatter,
-                          ascc_places_function places)
+void ascc_column_backward(const ascc_reverse *pass, const ascc_layer *layer, const ascc_term *term,
+                          const uint32_t *list, size_t n)
 {
+    (void)layer;
     const size_t length = ascc_matrix_length(term);
     const bool scatters =
         ascc_reverse_source(pass, term) || (ascc_term_is_relative(term) && pass->pass->velocity);
@@ -158,13 +158,13 @@ void ascc_column_backward(const ascc_reverse *pass, const ascc_term *term, const
         ascc_neighborhood around;
         ascc_column_look(&around, pass->run, term, list[r], pass->scratch, pass->room,
                          pass->sequence);
-        gather(pass->run, term, &around, pass->column);
+        term->operation->around->gather(pass->run, term, &around, pass->column);
         if (!weightless)
             ascc_matrix_keep_column(pass, term, r);
         if (pass->pass->seen)
-            places(pass, term, &around, list[r], column_gradient);
+            term->operation->around->places(pass, term, &around, list[r], column_gradient);
         if (scatters)
-            scatter_row(pass, term, &around, list[r], column_gradient, scatter);
+            scatter_row(pass, term, &around, list[r], column_gradient);
     }
     if (!weightless)
         ascc_matrix_back_weights(pass, term, n);

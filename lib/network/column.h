@@ -47,11 +47,6 @@ void ascc_column_look(ascc_neighborhood *around, const ascc_network_run *run, co
                       size_t row, float *scratch, size_t room, const uint32_t *sequence);
 void ascc_column_scratch(const ascc_plan *plan, const ascc_term *term, ascc_scratch_sizes *sizes);
 
-/* `columns`, `forward` and `backward` of an operation that gathers like this. */
-size_t ascc_column_gather(const ascc_tile *tile, const ascc_term *term,
-                          ascc_gather_function gather);
-void ascc_column_forward(const ascc_tile *tile, const ascc_term *term, ascc_gather_function gather);
-
 /* The way back of one row: its column's gradient to the features of the neighbours ... */
 typedef void (*ascc_scatter_function)(const ascc_reverse *pass, const ascc_term *term,
                                       const ascc_neighborhood *around, const uint32_t *write,
@@ -60,9 +55,17 @@ typedef void (*ascc_scatter_function)(const ascc_reverse *pass, const ascc_term 
 typedef void (*ascc_places_function)(const ascc_reverse *pass, const ascc_term *term,
                                      const ascc_neighborhood *around, size_t row,
                                      const float *column_gradient);
-void ascc_column_backward(const ascc_reverse *pass, const ascc_term *term, const uint32_t *list,
-                          size_t n, ascc_gather_function gather, ascc_scatter_function scatter,
-                          ascc_places_function places);
+
+/* ascc_operation.around: all that such an operation does itself. The others are its columns, forward, backward. */
+typedef struct ascc_column_functions {
+    ascc_gather_function gather;
+    ascc_scatter_function scatter;
+    ascc_places_function places;
+} ascc_column_functions;
+size_t ascc_column_gather(const ascc_tile *tile, const ascc_term *term);
+void ascc_column_forward(const ascc_tile *tile, const ascc_term *term);
+void ascc_column_backward(const ascc_reverse *pass, const ascc_layer *layer, const ascc_term *term,
+                          const uint32_t *list, size_t n);
 
 /* Adds the gradient by the displacement from a row to its neighbour. */
 void ascc_column_add_displacement(const ascc_reverse *pass, const ascc_term *term, size_t row,

@@ -24,6 +24,11 @@ void ascc_matrix_unpack(const ascc_plan *plan, const ascc_term *term, const floa
 void ascc_matrix_transpose(const ascc_plan *plan, const ascc_term *term, const float *packed,
                            float *to);
 
+/* The packing of an operation with one matrix, among its members. */
+#define ASCC_MATRIX_PACKING                                                                        \
+    .packed_size = ascc_matrix_packed_size, .pack = ascc_matrix_pack,                              \
+    .unpack = ascc_matrix_unpack, .transpose = ascc_matrix_transpose
+
 /* Adds the bias to the term's columns of a row. */
 static inline void ascc_matrix_add_bias(const ascc_network_run *run, const ascc_term *term,
                                         float *restrict row)

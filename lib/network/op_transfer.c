@@ -111,16 +111,6 @@ static void gather(const ascc_network_run *run, const ascc_term *term,
                                       around->feature, ascc_padded(term->inputs), column);
 }
 
-static size_t columns(const ascc_tile *tile, const ascc_term *term)
-{
-    return ascc_column_gather(tile, term, gather);
-}
-
-static void forward(const ascc_tile *tile, const ascc_term *term)
-{
-    ascc_column_forward(tile, term, gather);
-}
-
 /* ---- The way back ---- */
 
 static void scatter(const ascc_reverse *pass, const ascc_term *term,
@@ -174,12 +164,7 @@ static void places(const ascc_reverse *pass, const ascc_term *term, const ascc_n
     }
 }
 
-static void backward(const ascc_reverse *pass, const ascc_layer *layer, const ascc_term *term,
-                     const uint32_t *list, size_t n)
-{
-    (void)layer;
-    ascc_column_backward(pass, term, list, n, gather, scatter, places);
-}
+static const ascc_column_functions around = {gather, scatter, places};
 
 const ascc_operation ascc_op_transfer = {.name = "transfer",
                                          .type = "transfer",
@@ -188,12 +173,10 @@ const ascc_operation ascc_op_transfer = {.name = "transfer",
                                          .check = check,
                                          .initial = fill_initial,
                                          .lists = lists,
-                                         .packed_size = ascc_matrix_packed_size,
-                                         .pack = ascc_matrix_pack,
-                                         .unpack = ascc_matrix_unpack,
-                                         .transpose = ascc_matrix_transpose,
+                                         ASCC_MATRIX_PACKING,
                                          .cost = cost,
                                          .scratch = ascc_column_scratch,
-                                         .columns = columns,
-                                         .forward = forward,
-                                         .backward = backward};
+                                         .around = &around,
+                                         .columns = ascc_column_gather,
+                                         .forward = ascc_column_forward,
+                                         .backward = ascc_column_backward};
