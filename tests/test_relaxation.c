@@ -437,7 +437,7 @@ static void open_random(world *w, int d, int32_t threads, uint32_t cpu_disable, 
     (void)snprintf(
         more, sizeof more,
         ",\"divergence\":[0.5,0.5,0.5],\"repulsion\":{\"distance\":%s,\"stiffness\":0.5},"
-        "\"guess\":\"guess\"",
+        "\"guess\":\"guess\",\"rounds\":{\"most\":4,\"above\":0.1}",
         model_number(0.25 * spacing));
     const model_random network = {.seed = 3,
                                   .dimension = d,
@@ -483,7 +483,9 @@ static void the_same_bits_on_every_cpu_for_any_threads_and_order(void **state)
             static const int32_t threads[] = {1, 2, 7};
             world w;
             open_random(&w, d, threads[n % 3], n < 6 ? (n * 5) & cpu : n & cpu, n > 8 ? n : 0);
-            check_good(&w, ascc_step_run(w.step, w.particles, NULL, 5));
+            check_good(&w, ascc_step_run(w.step, w.particles, NULL, 1));
+            assert_true(statistics_of(&w).sweeps > 4); /* more rounds than one */
+            check_good(&w, ascc_step_run(w.step, w.particles, NULL, 4));
             check_conserved(&w);
             assert_true(statistics_of(&w).compression_before.largest > 0.0);
             if (n == 0)
@@ -662,6 +664,82 @@ static void a_compressed_block_spreads_to_rest_density(void **state)
     }
 }
 
+/* Without gravity and walls that hold: the second round is the step of particles that begin at rest where the
+ * first round left them; its velocity comes on top. */
+static void a_second_round_is_what_a_step_from_the_first_one_does(void **state)
+{
+    (void)state;
+    for (int d = 2; d <= 3; d++) {
+        static double x[200 * 3], v[200 * 3], m[200], begun[200 * 3], after[200 * 3];
+        world two, one;
+        dice r = {91};
+        const size_t n = crowd(&r, d, 150, 2.0, x, v, m, false);
+        open_pbf(&two, d, 0.0, 3, ",\"rounds\":{\"most\":2,\"above\":0.1}");
+        open_pbf(&one, d, 0.0, 3, "");
+        for (int k = 0; k < 2; k++) {
+            world *w = k ? &one : &two;
+            add_fluid(w, n, x, v, m);
+            add_floor(w, 4.0 * spacing, 0.6 * spacing, 1);
+            check_good(w, ascc_step_run(w->step, w->particles, NULL, 1));
+        }
+        assert_int_equal(statistics_of(&two).sweeps, 6);
+        for (size_t i = 0; i < n; i++)
+            for (int c = 0; c < d; c++)
+                begun[i * (size_t)d + (size_t)c] = ascc_velocity(one.particles, i, c);
+        memcpy(after, one.particles->position, n * (size_t)d * sizeof *after);
+        world next;
+        open_pbf(&next, d, 0.0, 3, "");
+        add_fluid(&next, n, after, NULL, m);
+        add_floor(&next, 4.0 * spacing, 0.6 * spacing, 1);
+        check_good(&next, ascc_step_run(next.step, next.particles, NULL, 1));
+        double moved = 0.0;
+        for (size_t i = 0; i < n; i++)
+            for (int c = 0; c < d; c++) {
+                const size_t k = i * (size_t)d + (size_t)c;
+                const double more = ascc_velocity(next.particles, i, c);
+                moved = fmax(moved, fabs(more) * time_step);
+                assert_true(fabs(two.particles->position[k] - next.particles->position[k]) <
+                            1e-6 * spacing);
+                assert_true(fabs(ascc_velocity(two.particles, i, c) - begun[k] - more) * time_step <
+                            1e-6 * spacing);
+            }
+        assert_true(moved > 0.01 * spacing);
+        close_world(&two);
+        close_world(&one);
+        close_world(&next);
+    }
+}
+
+/* Faster than lists reach: where the network saw them, most of these particles were below the floor. */
+static void an_impact_on_a_floor_is_less_dense_after_more_rounds(void **state)
+{
+    (void)state;
+    static const char *const more[] = {",\"contact\":0.02",
+                                       ",\"contact\":0.02,\"rounds\":{\"most\":6,\"above\":0.2}"};
+    double densest[2] = {0.0, 0.0};
+    for (int k = 0; k < 2; k++) {
+        static double x[600 * 3], v[600 * 3];
+        const int side[3] = {7, 5, 7};
+        world w;
+        open_pbf(&w, 3, 0.0, 4, more[k]);
+        const size_t n = lattice(3, side, 0.93 * spacing, 1.0 * spacing, x);
+        for (size_t i = 0; i < n; i++)
+            v[i * 3 + 1] = -5.0;
+        add_fluid(&w, n, x, v, NULL);
+        add_floor(&w, 8.0 * spacing, 0.65 * spacing, 1);
+        for (int step = 0; step < 3; step++) {
+            ascc_measures m = {.size = sizeof m};
+            check_good(&w, ascc_step_run(w.step, w.particles, NULL, 1));
+            check_conserved(&w);
+            check_good(&w, ascc_particles_measure(w.particles, &m));
+            densest[k] = fmax(densest[k], m.max_density);
+        }
+        close_world(&w);
+    }
+    print_message("# densest: %.2f in one round, %.2f in up to six\n", densest[0], densest[1]);
+    assert_true(densest[1] < 0.8 * densest[0]);
+}
+
 static void a_compressed_block_on_a_floor_moves_up_and_the_floor_down(void **state)
 {
     (void)state;
@@ -793,10 +871,12 @@ static void scenes_of_any_density_end_in_bounded_corrections(void **state)
         const int d = 2 + n % 2;
         const double density = 0.2 * pow(25.0, dice_uniform(&r, 0.0, 1.0));
         world w;
-        open_pbf(
-            &w, d, -9.81, n % 9,
-            ",\"divergence\":[0.5,0.5,0.5],\"contact\":0.02,\"repulsion\":{\"distance\":0.0125,"
-            "\"stiffness\":0.5}");
+        open_pbf(&w, d, -9.81, n % 9,
+                 n % 2
+                     ? ",\"divergence\":[0.5,0.5,0.5],\"contact\":0.02,\"repulsion\":{\"distance\":"
+                       "0.0125,\"stiffness\":0.5}"
+                     : ",\"divergence\":[0.5,0.5,0.5],\"contact\":0.02,"
+                       "\"rounds\":{\"most\":4,\"above\":0.2}");
         const size_t count = crowd(&r, d, 20 + dice_next(&r) % 60, density, x, v, m, n % 3 == 0);
         add_fluid(&w, count, x, v, m);
         if (n % 4)
@@ -887,6 +967,18 @@ static void bad_constants_are_refused_by_name(void **state)
          "\"warm\":0.9}",
          "warm"},
         {"{\"support\":0.1,\"rest_volume\":1e-4,\"omega\":[0.5,0.5,0.5,0.5],\"epsilon\":0.1,"
+         "\"limit\":0.01,\"rounds\":4}",
+         "rounds"},
+        {"{\"support\":0.1,\"rest_volume\":1e-4,\"omega\":[0.5,0.5,0.5,0.5],\"epsilon\":0.1,"
+         "\"limit\":0.01,\"rounds\":{\"most\":9,\"above\":0.2}}",
+         "most"},
+        {"{\"support\":0.1,\"rest_volume\":1e-4,\"omega\":[0.5,0.5,0.5,0.5],\"epsilon\":0.1,"
+         "\"limit\":0.01,\"rounds\":{\"most\":2,\"above\":0}}",
+         "above"},
+        {"{\"support\":0.1,\"rest_volume\":1e-4,\"omega\":[0.5,0.5,0.5,0.5],\"epsilon\":0.1,"
+         "\"limit\":0.01,\"rounds\":{\"most\":2}}",
+         "above"},
+        {"{\"support\":0.1,\"rest_volume\":1e-4,\"omega\":[0.5,0.5,0.5,0.5],\"epsilon\":0.1,"
          "\"limit\":0.01,\"guess\":\"nobody\"}",
          "'nobody'"},
         {"{\"support\":0.1,\"rest_volume\":1e-4,\"omega\":[0.5,0.5,0.5,0.5],\"epsilon\":0.1,"
@@ -934,6 +1026,8 @@ int main(void)
         cmocka_unit_test(without_memory_a_step_fails_and_changes_nothing),
         cmocka_unit_test(a_block_at_rest_density_is_left_alone),
         cmocka_unit_test(a_compressed_block_spreads_to_rest_density),
+        cmocka_unit_test(a_second_round_is_what_a_step_from_the_first_one_does),
+        cmocka_unit_test(an_impact_on_a_floor_is_less_dense_after_more_rounds),
         cmocka_unit_test(a_compressed_block_on_a_floor_moves_up_and_the_floor_down),
         cmocka_unit_test(the_density_of_walls_does_not_matter),
         cmocka_unit_test(a_still_column_on_a_floor_does_not_sink),

@@ -420,6 +420,9 @@ static void gradients_through_the_relaxation_are_right(void **state)
         if (v > 4)
             (void)snprintf(text + strlen(text) - 1, sizeof text - strlen(text) + 1,
                            ",\"guess\":\"guess\"}");
+        if (v % 2)
+            (void)snprintf(text + strlen(text) - 1, sizeof text - strlen(text) + 1,
+                           ",\"rounds\":{\"most\":%d,\"above\":0.001}}", 2 + v / 4);
         gradient_case c = {.name = "relaxation",
                            .random = everything(1800 + (uint64_t)v, d),
                            .unroll = 1 + v % 3,

@@ -27,6 +27,7 @@ typedef struct relax {
     int32_t dimension; /* of a new one */
     double spacing, time_step;
     bool none, current;
+    double rounds, again;
     double omega[SWEEPS], divergence[SWEEPS];
     int omega_count, divergence_count;
     /* Lengths in spacings, volume in spacings^dimension. */
@@ -38,11 +39,15 @@ static const char help[] =
     "       ascc relax --new DIMENSION --spacing M --dt S -o FILE [options]\n"
     "  Writes MODEL with a relaxation after its network (docs/file-format.md), in place of one "
     "that it\n"
-    "  has; or a model that is a relaxation alone.\n"
+    "  has, whose guess it keeps; or a model that is a relaxation alone.\n"
     "\n"
     "options, lengths in particle spacings\n"
     "  --omega A,B,...       weights of the pressure sweeps (0.5,0.5,0.5,0.5)\n"
     "  --divergence A,B,...  of the divergence sweeps, or none (0.5,0.5,0.5,0.5)\n"
+    "  --rounds N            of pressure sweeps at most, each at the places that the one before "
+    "left (1)\n"
+    "  --again E             another round follows one that began with an excess of density above "
+    "this (0.2)\n"
     "  --support H           of the cubic spline (2)\n"
     "  --volume V            of a particle at rest, spacings^dimension (0.8)\n"
     "  --epsilon E           softening (0.1)\n"
@@ -94,6 +99,7 @@ static bool read_option(relax *r, const char *name, const char *value)
         {"--spacing", &r->spacing},     {"--dt", &r->time_step},        {"--support", &r->support},
         {"--volume", &r->volume},       {"--epsilon", &r->epsilon},     {"--limit", &r->limit},
         {"--repulsion", &r->repulsion}, {"--stiffness", &r->stiffness}, {"--contact", &r->contact},
+        {"--rounds", &r->rounds},       {"--again", &r->again},
     };
     double number;
     for (size_t i = 0; i < sizeof numbers / sizeof *numbers; i++)
@@ -119,11 +125,11 @@ static bool read_option(relax *r, const char *name, const char *value)
 
 static bool read_arguments(relax *r, int argc, char **argv)
 {
-    static const char *const options[] = {"--spacing", "--dt",    "--support",    "--volume",
-                                          "--epsilon", "--limit", "--repulsion",  "--stiffness",
-                                          "--contact", "--omega", "--divergence", "--new",
-                                          "--name",    "-o",      "--none",       "--current",
-                                          NULL};
+    static const char *const options[] = {
+        "--spacing",    "--dt",        "--support",   "--volume",  "--epsilon",
+        "--limit",      "--repulsion", "--stiffness", "--contact", "--omega",
+        "--divergence", "--new",       "--name",      "-o",        "--none",
+        "--current",    "--rounds",    "--again",     NULL};
     for (int i = 0; i < argc; i++) {
         if (strcmp(argv[i], "--none") == 0) {
             r->none = true;
@@ -165,6 +171,9 @@ static json_t *relaxation_of(const relax *r, int32_t dimension, double spacing)
     json_object_set_new(o, "limit", json_real(r->limit * spacing));
     if (r->divergence_count)
         json_object_set_new(o, "divergence", list_of(r->divergence, r->divergence_count));
+    if (r->rounds != 1.0)
+        json_object_set_new(
+            o, "rounds", json_pack("{s:I,s:f}", "most", (json_int_t)r->rounds, "above", r->again));
     if (r->repulsion > 0.0)
         json_object_set_new(
             o, "repulsion",
@@ -196,14 +205,20 @@ static char *describe(const relax *r, const char *text)
     json_t *network = text ? json_loads(text, JSON_REJECT_DUPLICATES, NULL) : new_network(r);
     const double spacing = json_number_value(json_object_get(network, "particle_spacing"));
     const json_int_t dimension = json_integer_value(json_object_get(network, "dimension"));
+    json_t *guess = json_incref(json_object_get(json_object_get(network, "relaxation"), "guess"));
     json_object_del(network, "relaxation");
-    if (!r->none)
-        json_object_set_new(network, "relaxation", relaxation_of(r, (int32_t)dimension, spacing));
+    if (!r->none) {
+        json_t *made = relaxation_of(r, (int32_t)dimension, spacing);
+        if (guess)
+            json_object_set(made, "guess", guess);
+        json_object_set_new(network, "relaxation", made);
+    }
+    json_decref(guess);
     if (r->name)
         json_object_set_new(network, "name", json_string(r->name));
-    char *made = network ? json_dumps(network, TEXT) : NULL;
+    char *written = network ? json_dumps(network, TEXT) : NULL;
     json_decref(network);
-    return made;
+    return written;
 }
 
 /* ---- Files ---- */
@@ -294,6 +309,8 @@ int ascc_command_relax(int argc, char **argv)
                .limit = 0.15,
                .repulsion = 0.25,
                .stiffness = 0.5,
+               .rounds = 1.0,
+               .again = 0.2,
                .contact = 0.4};
     if (!read_arguments(&r, argc, argv))
         return 2;

@@ -132,10 +132,14 @@ typedef struct ascc_sweeps {
     double omega[ASCC_MAX_SWEEPS]; /* of each: what its correction is multiplied with */
 } ascc_sweeps;
 
+#define ASCC_MAX_ROUNDS 8 /* of a relaxation */
+
 /* Pressure from a few sweeps after the network, and one convolution of it (docs/method.md). */
 typedef struct ascc_relaxation {
     ascc_sweeps pressure; /* none = there is no relaxation */
     ascc_sweeps divergence;
+    int32_t rounds;              /* of pressure sweeps at most: 1 or more */
+    double again;                /* another one follows one that began with an excess above this */
     double epsilon;              /* of the lattice's response, added to each particle's own */
     double support;              /* of the cubic spline, m */
     double rest_volume;          /* of a particle, m^dimension */

@@ -119,6 +119,17 @@ static int32_t read_guess(ascc_reader *reader, uint32_t object, const ascc_plan_
     return value;
 }
 
+/* How often pressure sweeps may begin anew in a step. */
+static void read_rounds(ascc_reader *reader, uint32_t object, ascc_relaxation *r)
+{
+    const uint32_t o = ascc_reader_object(reader, object, "rounds");
+    ascc_reader_where(reader, "relaxation 'rounds'");
+    r->rounds = ascc_reader_integer(reader, o, "most", 1, ASCC_MAX_ROUNDS);
+    r->again = ascc_reader_number(reader, o, "above", 1e-3, 1e3);
+    ascc_reader_end(reader, o);
+    ascc_reader_where(reader, "relaxation");
+}
+
 void ascc_relaxation_read(ascc_reader *reader, uint32_t object, ascc_plan_builder *builder)
 {
     static const char *const directions[] = {"current"};
@@ -126,7 +137,7 @@ void ascc_relaxation_read(ascc_reader *reader, uint32_t object, ascc_plan_builde
     if (!ascc_reader_has(reader, object, "relaxation"))
         return;
     const uint32_t o = ascc_reader_object(reader, object, "relaxation");
-    ascc_relaxation r = {0};
+    ascc_relaxation r = {.rounds = 1};
     ascc_reader_where(reader, "relaxation");
     r.support = ascc_reader_number(reader, o, "support", ASCC_PLAN_MIN, ASCC_PLAN_MAX);
     r.rest_volume = ascc_reader_number(reader, o, "rest_volume", 1e-45, 1e45);
@@ -135,6 +146,8 @@ void ascc_relaxation_read(ascc_reader *reader, uint32_t object, ascc_plan_builde
     r.limit = ascc_reader_number(reader, o, "limit", 1e-6 * r.support, r.support);
     if (ascc_reader_has(reader, o, "divergence"))
         read_sweeps(reader, o, "divergence", &r.divergence);
+    if (ascc_reader_has(reader, o, "rounds"))
+        read_rounds(reader, o, &r);
     if (ascc_reader_has(reader, o, "direction"))
         r.current_direction = 1 + ascc_reader_choice(reader, o, "direction", directions, 1);
     if (ascc_reader_has(reader, o, "guess"))

@@ -9,6 +9,7 @@ typedef struct advance_job {
     const ascc_particles *p;
     const ascc_motion *motion;
     const int64_t *impulse;
+    bool further; /* from momenta that the step has reached, not from those before it */
     ascc_advance *advance;
     atomic_size_t bad; /* 1 + first row that fails */
 } advance_job;
@@ -20,20 +21,21 @@ static ascc_status advance_row(const advance_job *job, size_t i, ascc_message *m
     ascc_advance *advance = job->advance;
     const size_t d = (size_t)p->dimension;
     const double dt = motion->time_step;
-    double moved = 0.0;
+    double moved = 0.0, position[3];
+    int64_t sum[3];
     for (size_t c = 0; c < d; c++) {
         const size_t k = i * d + c;
-        int64_t sum;
-        if (__builtin_add_overflow(p->momentum[k] + advance->external[k], job->impulse[k], &sum) ||
-            sum > ASCC_MOMENTUM_LIMIT || sum < -ASCC_MOMENTUM_LIMIT)
+        const int64_t from =
+            job->further ? advance->momentum[k] : p->momentum[k] + advance->external[k];
+        if (__builtin_add_overflow(from, job->impulse[k], &sum[c]) ||
+            sum[c] > ASCC_MOMENTUM_LIMIT || sum[c] < -ASCC_MOMENTUM_LIMIT)
             return ascc_fail(message, ASCC_ERROR_RANGE,
                              "fluid particle %" PRIu64 " (row %zu): momentum too large to hold",
                              p->id[i], i);
-        const double step = dt * ((double)sum * p->quantum / p->mass[i]);
-        advance->momentum[k] = sum;
-        advance->position[k] = p->position[k] + step;
+        const double step = dt * ((double)sum[c] * p->quantum / p->mass[i]);
+        position[c] = p->position[k] + step;
         moved += step * step;
-        if (!(fabs(advance->position[k]) <= ASCC_POSITION_LIMIT * p->spacing))
+        if (!(fabs(position[c]) <= ASCC_POSITION_LIMIT * p->spacing))
             return ascc_fail(message, ASCC_ERROR_RANGE,
                              "fluid particle %" PRIu64 " (row %zu): position out of range",
                              p->id[i], i);
@@ -44,6 +46,10 @@ static ascc_status advance_row(const advance_job *job, size_t i, ascc_message *m
                          "fluid particle %" PRIu64
                          " (row %zu) would move %g, more than max_displacement = %g",
                          p->id[i], i, sqrt(moved), motion->max_displacement);
+    for (size_t c = 0; c < d; c++) {
+        advance->momentum[i * d + c] = sum[c];
+        advance->position[i * d + c] = position[c];
+    }
     return ASCC_OK;
 }
 
@@ -59,13 +65,24 @@ static void advance_rows(void *data, size_t begin, size_t end, int32_t slot)
         }
 }
 
-ascc_status ascc_stage_advance(ascc_step_state *state)
+static ascc_status advance_all(ascc_step_state *state, const int64_t *impulse, bool further)
 {
     advance_job job = {.p = state->particles,
                        .motion = state->motion,
-                       .impulse = state->impulses.fluid,
+                       .impulse = impulse,
+                       .further = further,
                        .advance = &state->advance};
     ascc_workers_run(state->tools.workers, job.p->fluid_count, 1024, advance_rows, &job);
     const size_t bad = atomic_load(&job.bad); /* says once more why */
     return bad ? advance_row(&job, bad - 1, state->tools.message) : ASCC_OK;
+}
+
+ascc_status ascc_stage_advance(ascc_step_state *state)
+{
+    return advance_all(state, state->impulses.fluid, false);
+}
+
+ascc_status ascc_advance_further(ascc_step_state *state, const int64_t *impulse)
+{
+    return advance_all(state, impulse, true);
 }

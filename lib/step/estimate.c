@@ -185,9 +185,16 @@ static double relaxation_bytes(const ascc_network *network, double fluid, double
         return 0.0;
     const ascc_list_key key = {
         .query = ASCC_SET_FLUID, .source = ASCC_SET_FLUID, .radius = plan->relaxation.reach};
+    double anew = 0.0; /* of a second round: points, cells and lists */
+    if (plan->relaxation.rounds > 1) {
+        const ascc_list_key wall_key = {
+            .query = ASCC_SET_FLUID, .source = ASCC_SET_BOUNDARY, .radius = key.radius};
+        anew = 3.0 * (fluid + boundary) * (2.0 * POINT_BYTES + 28.0) +
+               rows_bytes(plan, &key, fluid) + rows_bytes(plan, &wall_key, fluid);
+    }
     const double walls = 2.0 * POINT_BYTES + 4.0 + SORT_BYTES + 4.0 * 1.125 * WALL_NEIGHBORS;
     return fluid * (100.0 + 20.0 * (row_length(plan, &key) + 7.0) + 41.0 + 8.0 * plan->dimension) +
-           boundary * (4.0 + walls);
+           boundary * (4.0 + walls) + anew;
 }
 
 size_t ascc_estimate_scratch(const ascc_network *network, size_t fluid, size_t boundary,

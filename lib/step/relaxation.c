@@ -14,7 +14,7 @@
 #include <math.h>
 #include <string.h>
 
-#include "stage.h"
+#include "relaxation_pairs.h"
 
 #define ROWS 256 /* of a block of work */
 /* How far the network may take a particle from where it saw it, units: differences fit 32 bits. */
@@ -298,11 +298,12 @@ static ascc_status open_relaxation(relaxation *r, ascc_step_state *state, bool s
     const ascc_network_run *run = &state->run;
     const ascc_search_tools *tools = &state->tools;
     const ascc_relaxation *constants = &state->network->plan->relaxation;
+    const ascc_relaxation_round *round = &state->relaxed.round[state->relaxed.rounds - 1];
     *r =
         (relaxation){.state = state,
                      .constants = constants,
-                     .rows = &run->rows[state->network->relaxation_key[0]],
-                     .wall_rows = &run->rows[state->network->relaxation_key[1]],
+                     .rows = round->rows[0],
+                     .wall_rows = round->rows[1],
                      .count = state->hierarchy.set[ASCC_SET_FLUID].count,
                      .inverse_support = (float)(state->hierarchy.scale.unit / constants->support),
                      .repulsion = slows ? 0.0f : (float)(constants->repulsion / constants->support),
@@ -567,15 +568,6 @@ static void measure(relaxation *r, ascc_compression *to)
     to->largest = COMPRESSION_UNIT * (double)atomic_load(&r->largest);
 }
 
-/* Adds what was given to impulses; false where that overflows. */
-static bool add_impulses(int64_t *to, const int64_t *given, size_t count)
-{
-    bool good = true;
-    for (size_t k = 0; k < count; k++)
-        good &= !__builtin_add_overflow(to[k], given[k], &to[k]);
-    return good;
-}
-
 static int64_t *lend_given(ascc_step_state *state)
 {
     const ascc_particles *p = state->particles;
@@ -593,7 +585,7 @@ static bool keep_positions(ascc_step_state *state)
     double *to = ascc_arena_take(state->tools.arena, numbers, sizeof *to);
     if (to)
         memcpy(to, state->advance.position, numbers * sizeof *to);
-    state->relaxed.position = to;
+    state->relaxed.round[state->relaxed.rounds - 1].position = to;
     return to != NULL;
 }
 
@@ -632,40 +624,71 @@ static bool find_lines(relaxation *r)
     return place != NULL;
 }
 
-static ascc_status relax(ascc_step_state *state, relaxation *r, int64_t *given)
+/* The neighbours that the next round begins with: the network's lists, and once particles have been moved far,
+ * new ones. */
+static ascc_status begin_round(ascc_step_state *state)
 {
-    const ascc_particles *p = state->particles;
+    ascc_relaxed *relaxed = &state->relaxed;
+    ascc_relaxation_round *round = &relaxed->round[relaxed->rounds++];
+    for (int i = 0; i < 2; i++)
+        round->rows[i] = relaxed->rounds == 1 ? &state->run.rows[state->network->relaxation_key[i]]
+                                              : (round - 1)->rows[i];
+    if (relaxed->rounds == 2)
+        return ascc_relaxation_pairs_find(state, round->rows);
+    return ASCC_OK;
+}
+
+static ascc_status relax(ascc_step_state *state, relaxation *r, int64_t *given,
+                         ascc_compression *found)
+{
     ascc_step_statistics *s = state->statistics;
+    const bool first = state->relaxed.rounds == 1;
     ascc_status status = given ? open_relaxation(r, state, false) : no_memory(state);
     if (status == ASCC_OK && !find_lines(r))
         status = no_memory(state);
     if (status != ASCC_OK)
         return status;
-    if (r->constants->guess)
+    if (r->constants->guess && first)
         r->guess = state->run.value[r->constants->guess].rectified;
     memset(r->change, 0, r->count * sizeof *r->change);
-    measure(r, &s->compression_before);
+    measure(r, found);
+    if (first)
+        s->compression_before = *found;
     sweep(r, &r->constants->pressure);
     measure(r, &s->compression_after);
-    s->sweeps = (uint64_t)r->constants->pressure.count;
+    s->sweeps = (uint64_t)(state->relaxed.rounds * r->constants->pressure.count);
     status = apply(r, given);
-    if (status == ASCC_OK &&
-        !add_impulses(state->impulses.fluid, given, p->fluid_count * (size_t)p->dimension))
-        status = ascc_fail(state->tools.message, ASCC_ERROR_RANGE,
-                           "the relaxation gives a particle an impulse too large to hold");
-    return status == ASCC_OK ? ascc_stage_advance(state) : status;
+    return status == ASCC_OK ? ascc_advance_further(state, given) : status;
 }
 
-ascc_status ascc_stage_relaxation(ascc_step_state *state)
+/* found: the compression that it begins with. */
+static ascc_status run_round(ascc_step_state *state, ascc_compression *found)
 {
-    if (!state->network->plan->relaxation.pressure.count || !state->particles->fluid_count)
-        return ASCC_OK;
+    ascc_status status = begin_round(state);
+    if (status != ASCC_OK)
+        return status;
     if (!keep_positions(state))
         return no_memory(state);
     const ascc_arena_mark mark = ascc_arena_mark_of(state->tools.arena);
     relaxation r;
-    const ascc_status status = relax(state, &r, lend_given(state));
+    status = relax(state, &r, lend_given(state), found);
     ascc_arena_return(state->tools.arena, mark);
+    return status;
+}
+
+ascc_status ascc_stage_relaxation(ascc_step_state *state)
+{
+    const ascc_relaxation *constants = &state->network->plan->relaxation;
+    if (!constants->pressure.count || !state->particles->fluid_count)
+        return ASCC_OK;
+    ascc_compression found;
+    ascc_status status = run_round(state, &found);
+    while (status == ASCC_OK && state->relaxed.rounds < constants->rounds &&
+           found.largest > constants->again) {
+        status = ascc_stage_contact(state); /* the next one begins where walls let particles be */
+        if (status == ASCC_OK)
+            status = run_round(state, &found);
+    }
     ascc_stage_lap(state, "relaxation");
     return status;
 }

@@ -35,10 +35,17 @@ typedef struct ascc_advance {
 /* At a free surface, where density lacks more than this, a divergence means nothing. */
 #define ASCC_SURFACE 0.35f
 
-/* What the relaxation began with, kept for a way back: [fluid count][dimension], host's units, or NULL. */
+/* What a round of the relaxation began with. */
+typedef struct ascc_relaxation_round {
+    double *position; /* kept for a way back: [fluid count][dimension], host's units, or NULL */
+    const ascc_rows *rows[2]; /* neighbours among fluid and walls */
+} ascc_relaxation_round;
+
+/* What the relaxation did; the divergence has the neighbours of its last round. */
 typedef struct ascc_relaxed {
-    double *position; /* where the network left the particles */
-    double *velocity; /* before their divergence was taken from them */
+    int32_t rounds;
+    ascc_relaxation_round round[ASCC_MAX_ROUNDS];
+    double *velocity; /* likewise kept, before their divergence was taken from them */
 } ascc_relaxed;
 
 /* All intermediate results of one step, in its arena: valid until that is reset. */
@@ -82,6 +89,8 @@ ascc_status ascc_stage_wall_motion(ascc_step_state *state);
 ascc_status ascc_stage_sight(ascc_step_state *state);
 /* New momenta and positions. errors: RANGE, NOT_FINITE; the message names the particle. */
 ascc_status ascc_stage_advance(ascc_step_state *state);
+/* The same by more impulses, [fluid count][dimension], from what the step has reached. errors: RANGE. */
+ascc_status ascc_advance_further(ascc_step_state *state, const int64_t *impulse);
 /* Pressure from densities, and what it moves (docs/method.md); nothing, and no time of its own, without a
  * relaxation in the model. errors: MEMORY, RANGE, LIMIT. */
 ascc_status ascc_stage_relaxation(ascc_step_state *state);

@@ -25,6 +25,7 @@ typedef struct reverse {
     const ascc_step_state *state;
     const ascc_relaxation *constants;
     const ascc_sweeps *sweeps;
+    const ascc_rows *const *rows; /* neighbours among fluid and walls */
     ascc_arena *arena;
     size_t count, d;
     double unit; /* supports of a unit of the host */
@@ -113,7 +114,7 @@ static double look_around(reverse *r, size_t i)
     double density = amount; /* its own */
     size_t at = r->start[i];
     for (int list = 0; list < 2; list++) {
-        const ascc_rows *rows = &state->run.rows[state->network->relaxation_key[list]];
+        const ascc_rows *rows = r->rows[list];
         for (uint32_t k = 0; k < rows->count[i]; k++) {
             const size_t j = rows->neighbor[rows->start[i] + k];
             double place[3] = {0.0, 0.0, 0.0}, volume = amount;
@@ -140,10 +141,9 @@ static double look_around(reverse *r, size_t i)
 
 static bool take_pairs(reverse *r)
 {
-    const ascc_network_run *run = &r->state->run;
     size_t most = 1;
     for (int list = 0; list < 2; list++) {
-        const ascc_rows *rows = &run->rows[r->state->network->relaxation_key[list]];
+        const ascc_rows *rows = r->rows[list];
         for (size_t i = 0; i < r->count; i++)
             most += rows->count[i];
     }
@@ -413,12 +413,14 @@ static bool take_memory(reverse *r)
 }
 
 static bool open_reverse(reverse *r, const ascc_step_state *state, ascc_arena *arena,
-                         const ascc_sweeps *sweeps, const double *position)
+                         const ascc_sweeps *sweeps, const ascc_relaxation_round *round,
+                         const double *position)
 {
     const ascc_relaxation *constants = &state->network->plan->relaxation;
     *r = (reverse){.state = state,
                    .constants = constants,
                    .sweeps = sweeps,
+                   .rows = round->rows,
                    .arena = arena,
                    .count = state->hierarchy.set[ASCC_SET_FLUID].count,
                    .d = (size_t)state->particles->dimension,
@@ -442,11 +444,13 @@ static void scatter(const reverse *r, const double *from, double factor, double 
 
 /* x' = x + d, v' = v + d / dt. */
 static ascc_status pressure_back(const ascc_step_state *state, ascc_arena *arena,
+                                 const ascc_relaxation_round *round,
                                  const ascc_relaxation_gradients *gradients)
 {
     reverse r;
-    if (!open_reverse(&r, state, arena, &state->network->plan->relaxation.pressure,
-                      state->relaxed.position))
+    const bool first = round == state->relaxed.round;
+    if (!open_reverse(&r, state, arena, &state->network->plan->relaxation.pressure, round,
+                      round->position))
         return ASCC_ERROR_MEMORY;
     double *by = zeros(&r, 3), *line = zeros(&r, 3), *velocity = zeros(&r, 3);
     r.by_before = zeros(&r, 3);
@@ -461,12 +465,14 @@ static ascc_status pressure_back(const ascc_step_state *state, ascc_arena *arena
         r.before = line;
     }
     r.repulsion = r.constants->repulsion / r.constants->support;
-    guess(&r);
+    if (first)
+        guess(&r);
     sweep(&r);
     apply_back(&r, by);
     for (int32_t s = r.sweeps->count; s > 0; s--)
         sweep_back(&r, s - 1);
-    guess_back(&r, gradients->by_guess);
+    if (first)
+        guess_back(&r, gradients->by_guess);
     geometry_back(&r, true);
     scatter(&r, r.by_place, r.unit, gradients->position);
     scatter(&r, r.by_before, r.unit, gradients->by_before);
@@ -479,7 +485,7 @@ static ascc_status divergence_back(const ascc_step_state *state, ascc_arena *are
 {
     reverse r;
     if (!open_reverse(&r, state, arena, &state->network->plan->relaxation.divergence,
-                      state->advance.position))
+                      &state->relaxed.round[state->relaxed.rounds - 1], state->advance.position))
         return ASCC_ERROR_MEMORY;
     double *by = zeros(&r, 3), *move = zeros(&r, 3);
     if (!by || !move)
@@ -512,9 +518,12 @@ ascc_status ascc_relaxation_backward(const ascc_step_state *state, ascc_arena *a
         ascc_arena_reset(arena);
         status = divergence_back(state, arena, gradients);
     }
-    if (status == ASCC_OK && constants->pressure.count && state->relaxed.position) {
+    for (int32_t n = state->relaxed.rounds; status == ASCC_OK && n > 0; n--) {
+        const ascc_relaxation_round *round = &state->relaxed.round[n - 1];
+        if (!round->position)
+            break;
         ascc_arena_reset(arena);
-        status = pressure_back(state, arena, gradients);
+        status = pressure_back(state, arena, round, gradients);
     }
     return status;
 }

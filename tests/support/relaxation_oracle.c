@@ -181,21 +181,26 @@ void relaxation_oracle(const ascc_plan *plan, size_t fluid, size_t walls, const 
             sum += spline(between(s, k, b, u));
         s->volume[k] = 1.0 / sum;
     }
-    double excess[MOST];
     put_places(s, position);
     find_geometry(s);
-    for (size_t i = 0; i < fluid; i++)
-        excess[i] = s->density[i] - 1.0;
-    for (size_t i = 0; guess && i < fluid; i++)
-        s->p[i] = guess[i] / r->lattice_response;
-    sweep(s, &r->pressure, excess, r->repulsion / r->support);
-    for (size_t i = 0; i < fluid; i++)
-        for (size_t c = 0; c < s->d; c++) {
-            position[i * s->d + c] += s->move[i][c] * r->support;
-            velocity[i * s->d + c] += s->move[i][c] / step;
+    bool again = true;
+    for (int32_t n = 0; n < r->rounds && again; n++) {
+        double excess[MOST];
+        again = false;
+        for (size_t i = 0; i < fluid; i++) {
+            excess[i] = s->density[i] - 1.0;
+            again |= excess[i] > r->again;
+            s->p[i] = guess && n == 0 ? guess[i] / r->lattice_response : 0.0;
         }
-    put_places(s, position);
-    find_geometry(s);
+        sweep(s, &r->pressure, excess, r->repulsion / r->support);
+        for (size_t i = 0; i < fluid; i++)
+            for (size_t c = 0; c < s->d; c++) {
+                position[i * s->d + c] += s->move[i][c] * r->support;
+                velocity[i * s->d + c] += s->move[i][c] / step;
+            }
+        put_places(s, position);
+        find_geometry(s);
+    }
     if (r->divergence.count)
         relax_velocities(s, step, velocity);
     free(s);
