@@ -589,7 +589,8 @@ static void check_rollout(const char *model, const char *scene, bool weightless,
         skip();
     ascc_particles *p = golden_particles(&n);
     ascc_step *step;
-    const ascc_step_options options = {.size = sizeof options, .time_step = n.time_step};
+    const ascc_step_options options = {
+        .size = sizeof options, .time_step = n.time_step, .substeps = -1};
     const ascc_forces forces = {.size = sizeof forces, .gravity = n.gravity};
     assert_int_equal(ascc_step_create(n.context, n.model, &options, &step), ASCC_OK);
     for (int done = 0, m = 0; m < 5 && marks[m] <= last; m++) {

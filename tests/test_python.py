@@ -406,7 +406,10 @@ class Life(Case):
         with self.assertRaises(ascc.Error):
             ascc.Particles()
         with self.assertRaises(ascc.Error) as caught:
-            ascc.Step(self.model, time_step=1e-9)
+            ascc.Step(self.model, time_step=-1.0)
+        self.assertEqual(caught.exception.status, ascc.Status.ARGUMENT)
+        with self.assertRaises(ascc.Error) as caught:
+            ascc.Step(self.model, time_step=1.0, substeps=3).run(self.set)
         self.assertEqual(caught.exception.status, ascc.Status.RANGE)
         self.set.add_fluid([[0, 0]])
         step = ascc.Step(self.model)

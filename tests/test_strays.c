@@ -102,7 +102,9 @@ static void run(result *r, const unsigned char *model, size_t size, const scene 
     ascc_model_info info = {.size = sizeof info};
     assert_int_equal(ascc_model_get_info(m, &info), ASCC_OK);
     ascc_particles *p = make_particles(context, info.particle_spacing, s);
-    assert_int_equal(ascc_step_create(context, m, NULL, &step), ASCC_OK);
+    const ascc_step_options whole = {.size = sizeof whole,
+                                     .substeps = -1}; /* whose fall is known */
+    assert_int_equal(ascc_step_create(context, m, &whole, &step), ASCC_OK);
     const ascc_forces forces = {.size = sizeof forces, .gravity = down};
     if (ascc_step_run(step, p, &forces, STEPS) != ASCC_OK)
         fail_msg("step: %s", ascc_step_message(step));

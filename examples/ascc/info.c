@@ -36,6 +36,9 @@ static void print_model(const char *path, const ascc_model_info *m)
         "  trained with      spacing %g m, time step %g s, gravity %g %g %g m/s^2, density %g",
         m->particle_spacing, m->time_step, m->gravity[0], m->gravity[1], m->gravity[2],
         m->rest_density);
+    ascc_line(stdout,
+              "  in one step       at most %g s, gravity %g spacings / step^2, ways of %g spacings",
+              m->time_step_max, m->gravity_max, m->way_max);
 }
 
 static void print_sequence(const char *path, const ascc_sequence *s)

@@ -7,7 +7,6 @@
 #include <ascc/ascc.h>
 
 #include "host.h"
-#include "console.h"
 #include "method.h"
 
 typedef struct learned {
@@ -16,7 +15,7 @@ typedef struct learned {
     ascc_model *model;
     ascc_step *step;
     ascc_particles *particles;
-    double time_step, spacing; /* of the model */
+    double time_step; /* of the model */
 } learned;
 
 static bool context_failed(const learned *m, const char *what, ascc_method_error *error)
@@ -58,7 +57,6 @@ static bool learned_load(learned *m, const char *path, ascc_method_error *error)
         return false;
     }
     m->time_step = info.time_step;
-    m->spacing = info.particle_spacing;
     return true;
 }
 
@@ -75,9 +73,6 @@ static bool learned_open(const char *settings, const ascc_method_scene *scene, v
         learned_close(m);
         return false;
     }
-    if (fabs(scene->spacing - m->spacing) > 0.01 * m->spacing)
-        ascc_line(stderr, "ascc: a scene with spacing %g m, a model trained with %g m",
-                  scene->spacing, m->spacing);
     *state = m;
     return true;
 }
@@ -116,7 +111,7 @@ static bool learned_set(void *state, const double *position, const double *veloc
     const double dt = m->scene->time_step;
     const ascc_particles_options particles = {.size = sizeof particles,
                                               .dimension = m->scene->dimension,
-                                              .spacing = m->spacing,
+                                              .spacing = m->scene->spacing,
                                               .mass = m->scene->mass};
     const ascc_step_options step = {.size = sizeof step,
                                     .time_step = fabs(dt - m->time_step) > 1e-6 * dt ? dt : 0.0};

@@ -207,6 +207,9 @@ typedef struct ascc_model_info {
     const char *description;
     double time_step_min, time_step_max; /* s: the range of steps that the weights are good for */
     double multiply_adds; /* of one step for each fluid particle, near the middle of a scene */
+    /* Likewise gravity, g dt^2 / h, and the way of a particle, in spacings a step; a step is cut into substeps
+     * that stay within (ascc_step_options.substeps). INFINITY = not said. */
+    double gravity_min, gravity_max, way_max;
 } ascc_model_info;
 
 ASCC_API ascc_status ascc_model_get_info(const ascc_model *model, ascc_model_info *info);
@@ -278,7 +281,7 @@ typedef struct ascc_particles_options {
 
 /**
  * The options of a particle set that suits a model: dimension, spacing, and as mass the rest density times
- * spacing^dimension; the rest zero. A step of the model refuses other spacings (MISMATCH).
+ * spacing^dimension; the rest zero.
  *
  * length_unit  metres in one unit of the host's length; 0 = 1. Give ascc_step_create the same
  * options      options->size set by the caller; receives the rest
@@ -655,24 +658,25 @@ typedef struct ascc_step ascc_step;
 
 /** Options of ascc_step_create. */
 typedef struct ascc_step_options {
-    size_t size;      /* sizeof(ascc_step_options) */
-    double time_step; /* s; 0 = the model's. A longer one than the model was trained for is cut into
-                         * equal substeps; with a shorter one than the model's the learned velocity
-                         * correction is scaled by time_step / the model's, as an acceleration would be. */
-    double length_unit; /* metres in one unit of the host's length; 0 = 1. 0.01 for centimetres */
+    size_t size; /* sizeof(ascc_step_options) */
     double
-        max_displacement; /* length unit a particle may move in a (sub)step, else RANGE; 0 = 64 of the
-                              * model's spacings, INFINITY = no bound */
-    int32_t max_neighbors; /* most neighbours of one point before LIMIT is returned; 0 = 4096 */
-    int32_t reserved;
+        time_step; /* s; 0 = the model's. In steps shorter than the model's what it learned counts as
+                         * an acceleration would */
+    double length_unit; /* metres in one unit of the host's length; 0 = 1. 0.01 for centimetres */
+    double max_displacement; /* length unit a particle may move in a (sub)step, else RANGE; 0 = 64
+                              * spacings, INFINITY = no bound */
+    int32_t max_neighbors;   /* most neighbours of one point before LIMIT is returned; 0 = 4096 */
+    int32_t substeps; /* what a time step is cut into, equal steps, so that the length of each,
+                              * gravity and the way of the fastest particle lie in the range that the
+                              * model was trained for (ascc_model_info): 0 = as many as it takes, n = at
+                              * most n, else RANGE; -1 = none, whatever the range */
 } ascc_step_options;
 
 /**
  * Makes a step. Model and context may be destroyed before it.
  *
  * options   NULL for all defaults; read during the call.
- * errors    ARGUMENT (a value negative or not finite), MEMORY, RANGE (a time_step shorter than the model's
- *           time_step_min, or longer than 1,000 times its time_step_max).
+ * errors    ARGUMENT (a value negative or not finite), MEMORY.
  */
 ASCC_API ascc_status ascc_step_create(ascc_context *context, const ascc_model *model,
                                       const ascc_step_options *options, ascc_step **step);
@@ -705,8 +709,11 @@ typedef struct ascc_forces {
  * that at the beginning of a step.
  *
  * forces    NULL = the model's gravity alone.
- * errors    ARGUMENT, MISMATCH (dimension; a spacing that is not the model's), MEMORY (scratch had to
- *           grow), NOT_FINITE, RANGE, LIMIT.
+ * Any spacing will do: a scene of others than the model's is the same scene at the model's, lengths times the
+ * ratio of the spacings, in metres, and time with its root, so that gravity is what it was.
+ *
+ * errors    ARGUMENT, MISMATCH (dimension), MEMORY (scratch had to grow), NOT_FINITE, RANGE (also what no number
+ *           of substeps brings into the model's range), LIMIT.
  *           Each step is a transaction: on error the set is, bit for bit, as after the last step that
  *           succeeded; ascc_step_statistics says how many did. Particles may be up to 3e10 of the
  *           model's largest radius from the origin; RANGE names the row of one that is farther.
@@ -736,7 +743,7 @@ typedef struct ascc_step_statistics {
     size_t size;          /* sizeof(ascc_step_statistics) */
     int32_t steps;        /* that succeeded in the last run */
     int32_t level_count;  /* entries used of level_points */
-    int32_t substeps;     /* that each step was cut into */
+    int32_t substeps;     /* that the last step was cut into */
     int32_t stage_count;  /* entries used of stage */
     double seconds_total; /* wall clock, of the run */
     /* By stage, in order: "forces" (and advection), "sight" (features, sorting and sampling of the levels),
@@ -756,6 +763,7 @@ typedef struct ascc_step_statistics {
      * began, by what sweeps predict; and how many there were. */
     ascc_compression compression_before, compression_after;
     uint64_t sweeps;
+    uint64_t substeps_total; /* of the run */
 } ascc_step_statistics;
 
 ASCC_API ascc_status ascc_step_get_statistics(const ascc_step *step,
@@ -797,7 +805,7 @@ typedef enum ascc_ladder_reason {
  * models    [count], 1 to ASCC_MAX_RUNGS, the best last: such as pbf3d, water3d, water3d-large. Of one
  *           dimension, spacing, gravity, and time step unless options->step says one. May be destroyed before.
  * options   NULL for all defaults; read during the call.
- * errors    ARGUMENT, MISMATCH (models that do not go together), MEMORY, RANGE (as ascc_step_create).
+ * errors    ARGUMENT, MISMATCH (models that do not go together), MEMORY.
  * cost      each rung holds a step with its own scratch.
  * threads   one thread at a time per ladder and per particle set.
  */

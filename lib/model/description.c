@@ -2,13 +2,16 @@
  * SPDX-License-Identifier: MIT */
 #include "description.h"
 
+#include <math.h>
 #include <string.h>
 
 #include "operation.h"
 #include "relaxation.h"
 
-#define SHORTEST_STEP 0.1 /* of the time step stated */
-#define ASCC_MAX_TYPES 32 /* words that `type` may be */
+#define SHORTEST_STEP 0.1  /* of the time step stated */
+#define USUAL_WAY 3.0      /* spacings a step, that a particle goes in what models learn from */
+#define USUAL_GRAVITY 1.25 /* times the model's own, which is 9.8, 9.80665 or 9.81 */
+#define ASCC_MAX_TYPES 32  /* words that `type` may be */
 #define COUNT(list) ((int32_t)(sizeof(list) / sizeof *(list)))
 
 static const char *const evaluations[] = {"current", "advected", "advected_mean"};
@@ -119,6 +122,34 @@ static void read_range(ascc_reader *reader, ascc_plan *plan)
     plan->time_step_max = range[1];
 }
 
+/* How much gravity and how fast a particle, in spacings and steps; without it what the model's own gravity comes to
+ * in its longest step, and less. */
+static void read_trained(ascc_reader *reader, ascc_plan *plan)
+{
+    double square = 0.0, gravity[2] = {0.0, INFINITY};
+    for (int c = 0; c < 3; c++)
+        square += plan->gravity[c] * plan->gravity[c];
+    if (square > 0.0)
+        gravity[1] = USUAL_GRAVITY * sqrt(square) * plan->time_step_max * plan->time_step_max /
+                     plan->spacing;
+    plan->way_max = USUAL_WAY;
+    if (ascc_reader_has(reader, 0, "trained")) {
+        const uint32_t trained = ascc_reader_object(reader, 0, "trained");
+        ascc_reader_where(reader, "network 'trained'");
+        if (ascc_reader_has(reader, trained, "gravity"))
+            ascc_reader_numbers(reader, trained, "gravity", 2, 0.0, ASCC_PLAN_MAX, gravity);
+        if (ascc_reader_has(reader, trained, "way"))
+            plan->way_max =
+                ascc_reader_number(reader, trained, "way", ASCC_PLAN_MIN, ASCC_PLAN_MAX);
+        ascc_reader_end(reader, trained);
+        ascc_reader_where(reader, "network");
+    }
+    if (reader->status == ASCC_OK && !(gravity[0] <= gravity[1] && gravity[1] > 0.0))
+        ascc_reader_fail(reader, "'trained' has no range of 'gravity'");
+    plan->gravity_min = gravity[0];
+    plan->gravity_max = gravity[1];
+}
+
 static void read_head(ascc_plan_builder *builder, ascc_reader *reader)
 {
     ascc_plan *plan = &builder->plan;
@@ -131,6 +162,7 @@ static void read_head(ascc_plan_builder *builder, ascc_reader *reader)
     ascc_reader_numbers(reader, 0, "gravity", plan->dimension, -ASCC_PLAN_MAX, ASCC_PLAN_MAX,
                         plan->gravity);
     plan->spacing = ascc_reader_number(reader, 0, "particle_spacing", ASCC_PLAN_MIN, ASCC_PLAN_MAX);
+    read_trained(reader, plan);
     plan->rest_density =
         ascc_reader_number(reader, 0, "rest_density", ASCC_PLAN_MIN, ASCC_PLAN_MAX);
     plan->advection =

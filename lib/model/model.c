@@ -271,6 +271,9 @@ ascc_status ascc_model_get_info(const ascc_model *model, ascc_model_info *info)
         .description = plan->description,
         .time_step_min = plan->time_step_min,
         .time_step_max = plan->time_step_max,
+        .gravity_min = plan->gravity_min,
+        .gravity_max = plan->gravity_max,
+        .way_max = plan->way_max,
         .multiply_adds = ascc_cost(plan, &counts),
     };
     return ascc_write_struct(info, &own, sizeof own, sizeof own) ? ASCC_OK : ASCC_ERROR_ARGUMENT;

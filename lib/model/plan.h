@@ -188,7 +188,9 @@ typedef struct ascc_plan {
     int32_t dimension;
     ascc_advection advection;
     double time_step, gravity[3], spacing, rest_density;
-    double time_step_min, time_step_max; /* s: the range that the weights were trained in */
+    /* The range that the weights were trained in: time steps, s; gravity, spacings a squared step; the way of a
+     * particle, spacings a step. */
+    double time_step_min, time_step_max, gravity_min, gravity_max, way_max;
     int32_t fluid_features[ASCC_MAX_FEATURES], fluid_feature_count, fluid_channels;
     int32_t boundary_features[ASCC_MAX_FEATURES], boundary_feature_count, boundary_channels;
     double boundary_crop; /* m: walls farther than this from the fluid's bounding box are left out;

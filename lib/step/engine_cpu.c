@@ -13,8 +13,8 @@ static ascc_impulse_scale impulse_scale(const ascc_step_state *state)
     ascc_impulse_scale scale = {.mass = p->mass, .position = p->position};
     for (int c = 0; c < 3; c++)
         scale.factor[c] = plan->output.scale[c] / plan->time_step *
-                          (state->motion->time_step / plan->time_step) / state->length_unit /
-                          p->quantum;
+                          (state->motion->time_step * state->time_unit / plan->time_step) *
+                          state->time_unit / state->length_unit / p->quantum;
     return scale;
 }
 

@@ -109,7 +109,7 @@ static ascc_status make_rungs(ascc_ladder *ladder, const ascc_model *const *mode
     const ascc_step *step = ladder->rung[0];
     const double dwell = o->dwell > 0.0 ? o->dwell : 1.0;
     ascc_rung_choice_open(&ladder->choice, ladder->count,
-                          (uint64_t)fmin(ceil(dwell / (step->time_step * step->substeps)), 1e15));
+                          (uint64_t)fmin(ceil(dwell / (step->time_step)), 1e15));
     ladder->clock = o->clock;
     ladder->user = o->user;
     ladder->budget = o->budget;

@@ -46,11 +46,12 @@ static bool lend_features(ascc_step_state *state)
     state->boundary_features = ascc_arena_lend(arena, p->boundary_count, wall * sizeof(float));
     if (!state->fluid_features || !state->boundary_features)
         return false;
-    const double unit = state->length_unit, motion = unit * plan->time_step / plan->spacing;
+    const double unit = state->length_unit / state->time_unit;
+    const double motion = unit * plan->time_step / plan->spacing;
     const double whole = whole_area(plan);
     double gravity[3] = {0.0, 0.0, 0.0};
     for (size_t c = 0; c < d; c++)
-        gravity[c] = state->motion->gravity[c] * plan->time_step * motion;
+        gravity[c] = state->motion->gravity[c] * plan->time_step * motion / state->time_unit;
     for (size_t i = 0; i < p->fluid_count; i++)
         features_of(plan, plan->fluid_features, plan->fluid_feature_count,
                     state->advance.velocity + i * d, unit, motion, gravity, 0.0,

@@ -54,8 +54,8 @@ typedef struct ascc_step_state {
     const ascc_network *network;
     const ascc_particles *particles;
     const ascc_motion *motion;
-    double length_unit;                                   /* m */
-    size_t *expected;                                     /* of the network's neighbour lists */
+    double length_unit, time_unit; /* m and s of the model in the host's unit and second */
+    size_t *expected;              /* of the network's neighbour lists */
     ascc_status (*engine)(struct ascc_step_state *state); /* engine.h */
     ascc_wall_volumes *walls;
     ascc_search_tools tools;
@@ -75,7 +75,8 @@ typedef struct ascc_step_state {
  * acceleration would. */
 static inline double ascc_step_share(const ascc_step_state *state)
 {
-    const double steps = state->motion->time_step / state->network->plan->time_step;
+    const double steps =
+        state->motion->time_step * state->time_unit / state->network->plan->time_step;
     return steps * steps;
 }
 

@@ -9,11 +9,10 @@
 #include "commit.h"
 #include "estimate.h"
 #include "points/bodies.h"
+#include "substeps.h"
 
 #define DEFAULT_MAX_NEIGHBORS 4096
 #define DEFAULT_DISPLACEMENT 64.0 /* spacings a step */
-#define SPACING_TOLERANCE 1e-3    /* of the model's: spacings are told in floats, too */
-#define MAX_SUBSTEPS 1000
 
 _Static_assert(sizeof(void *) != 8 || sizeof(ascc_step_options) == 40, "released layout");
 _Static_assert(sizeof(void *) != 8 || sizeof(ascc_forces) == 24, "released layout");
@@ -29,27 +28,12 @@ static ascc_status read_options(const ascc_step_options *given, ascc_step_option
         return ascc_fail(message, ASCC_ERROR_ARGUMENT, "ascc_step_options.size is not understood");
     if (!(o->time_step >= 0.0 && isfinite(o->time_step)) ||
         !(o->length_unit >= 0.0 && isfinite(o->length_unit)) || !(o->max_displacement >= 0.0) ||
-        o->max_neighbors < 0 || o->max_neighbors > 1 << 20 || o->reserved != 0)
+        o->max_neighbors < 0 || o->max_neighbors > 1 << 20 || o->substeps < -1)
         return ascc_fail(message, ASCC_ERROR_ARGUMENT,
                          "step options: time_step %g, length_unit %g, max_displacement %g, "
-                         "max_neighbors %d: each must be finite and >= 0",
-                         o->time_step, o->length_unit, o->max_displacement, o->max_neighbors);
-    return ASCC_OK;
-}
-
-/* Into how many steps the host's is cut, so that the network stays within its trained range. */
-static ascc_status find_substeps(ascc_step *step, double wanted, ascc_message *message)
-{
-    const ascc_plan *plan = &step->model->plan;
-    const double host = wanted > 0.0 ? wanted : plan->time_step;
-    const double count = ceil(host / plan->time_step_max * (1.0 - 1e-6));
-    if (host < plan->time_step_min * (1.0 - 1e-6) || count > MAX_SUBSTEPS)
-        return ascc_fail(message, ASCC_ERROR_RANGE,
-                         "time_step %g s: the model was trained for %g to %g s, and one step is "
-                         "cut into at most %d",
-                         host, plan->time_step_min, plan->time_step_max, MAX_SUBSTEPS);
-    step->substeps = count > 1.0 ? (int32_t)count : 1;
-    step->time_step = host / step->substeps;
+                         "max_neighbors %d: each must be finite and >= 0; substeps %d: at least -1",
+                         o->time_step, o->length_unit, o->max_displacement, o->max_neighbors,
+                         o->substeps);
     return ASCC_OK;
 }
 
@@ -57,18 +41,16 @@ static ascc_status fill_step(ascc_step *step, const ascc_step_options *o, ascc_m
 {
     ascc_context *context = step->context;
     const ascc_model *model = step->model;
-    ascc_status status = find_substeps(step, o->time_step, message);
+    step->time_step = o->time_step > 0.0 ? o->time_step : model->plan.time_step;
+    step->most_substeps = o->substeps;
     step->length_unit = o->length_unit > 0.0 ? o->length_unit : 1.0;
-    step->max_displacement = o->max_displacement > 0.0
-                                 ? o->max_displacement
-                                 : DEFAULT_DISPLACEMENT * model->plan.spacing / step->length_unit;
-    if (isinf(step->max_displacement))
-        step->max_displacement = 0.0;
+    step->model_length = step->length_unit;
+    step->model_time = 1.0;
+    step->max_displacement = o->max_displacement;
     step->engine = ascc_engine_cpu;
-    if (status == ASCC_OK)
-        status = ascc_network_create(
-            &step->network, &context->allocator, &model->plan, &model->packed,
-            o->max_neighbors ? o->max_neighbors : DEFAULT_MAX_NEIGHBORS, message);
+    const ascc_status status =
+        ascc_network_create(&step->network, &context->allocator, &model->plan, &model->packed,
+                            o->max_neighbors ? o->max_neighbors : DEFAULT_MAX_NEIGHBORS, message);
     if (status != ASCC_OK)
         return status;
     const size_t keys = (size_t)step->network.key_count;
@@ -222,7 +204,8 @@ ascc_status ascc_step_once(ascc_step *step, ascc_particles *p, const ascc_motion
         .network = &step->network,
         .particles = p,
         .motion = motion,
-        .length_unit = step->length_unit,
+        .length_unit = step->model_length,
+        .time_unit = step->model_time,
         .expected = step->expected,
         .engine = step->engine,
         .walls = &step->walls,
@@ -293,12 +276,6 @@ static ascc_status check_particles(ascc_step *step, const ascc_particles *p)
         return ascc_fail(&step->message, ASCC_ERROR_MISMATCH,
                          "a %dD model cannot step a %dD particle set", plan->dimension,
                          p->dimension);
-    const double spacing = p->spacing * step->length_unit;
-    if (!(fabs(spacing - plan->spacing) <= SPACING_TOLERANCE * plan->spacing))
-        return ascc_fail(&step->message, ASCC_ERROR_MISMATCH,
-                         "particles are %g m apart (spacing %g, length_unit %g m), but the model's "
-                         "are %g m",
-                         spacing, p->spacing, step->length_unit, plan->spacing);
     return ASCC_OK;
 }
 
@@ -347,17 +324,31 @@ static void take_back(const ascc_step *step, ascc_particles *p)
             memcpy(field[i].rows, at, field[i].size);
 }
 
+/* A particle may move so far in a step, in the host's unit; 0 = as far as it likes. */
+static double most_displacement(const ascc_step *step, const ascc_particles *p)
+{
+    if (isinf(step->max_displacement))
+        return 0.0;
+    const bool given = step->max_displacement > 0.0;
+    return given ? step->max_displacement : DEFAULT_DISPLACEMENT * p->spacing;
+}
+
 /* One time step of the host's: all of its substeps, or none. */
-static ascc_status run_once(ascc_step *step, ascc_particles *p, const ascc_motion *motion)
+static ascc_status run_once(ascc_step *step, ascc_particles *p, ascc_motion *motion)
 {
     ascc_step_state state;
+    int32_t count;
+    ascc_status status = ascc_count_substeps(step, p, motion, &count);
+    if (status != ASCC_OK)
+        return status;
+    motion->time_step = step->time_step / count;
     const bool first = step->statistics.steps == 0 && !step->continues;
-    if (step->substeps > 1 && !keep(step, p))
+    if (count > 1 && !keep(step, p))
         return ascc_fail(&step->message, ASCC_ERROR_MEMORY, "no memory to keep %zu particles",
                          p->fluid_count);
     const ascc_step_statistics before = step->statistics;
-    ascc_status status = ASCC_OK;
-    for (int32_t n = 0; n < step->substeps && status == ASCC_OK; n++) {
+    step->statistics.substeps = count;
+    for (int32_t n = 0; n < count && status == ASCC_OK; n++, step->statistics.substeps_total++) {
         status = ascc_step_once(step, p, motion, first && n == 0, &step->arena, &state);
         if (status != ASCC_OK && n > 0)
             take_back(step, p);
@@ -373,12 +364,13 @@ ascc_status ascc_step_run(ascc_step *step, ascc_particles *particles, const ascc
     ASCC_FLOAT_SCOPE;
     if (!step || step->magic != ASCC_STEP_MAGIC)
         return ASCC_ERROR_ARGUMENT;
-    step->statistics = (ascc_step_statistics){.level_count = step->model->plan.level_count,
-                                              .substeps = step->substeps};
-    ascc_motion motion = {.time_step = step->time_step,
-                          .advection = step->model->plan.advection,
-                          .max_displacement = step->max_displacement};
+    step->statistics = (ascc_step_statistics){.level_count = step->model->plan.level_count};
+    ascc_motion motion = {.advection = step->model->plan.advection};
     ascc_status status = check_particles(step, particles);
+    if (status == ASCC_OK) {
+        ascc_find_units(step, particles);
+        motion.max_displacement = most_displacement(step, particles);
+    }
     if (status == ASCC_OK && count < 0)
         status = ascc_fail(&step->message, ASCC_ERROR_ARGUMENT, "count = %d is negative", count);
     if (status == ASCC_OK)

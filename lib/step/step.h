@@ -7,11 +7,12 @@
 
 struct ascc_step {
     uint32_t magic;
-    int32_t substeps;      /* of a host's time step */
-    ascc_context *context; /* retained */
-    ascc_model *model;     /* retained */
-    double time_step;      /* of a substep, s */
-    double length_unit, max_displacement;
+    int32_t most_substeps;                /* of a time step; 0 = as many as it takes, -1 = one */
+    ascc_context *context;                /* retained */
+    ascc_model *model;                    /* retained */
+    double time_step;                     /* the host's, s */
+    double length_unit, max_displacement; /* m; the host's, 0 = by spacings */
+    double model_length, model_time;      /* the model's m and s in the host's unit and second */
     ascc_network network;
     size_t *expected; /* [key_count of the network] neighbours of the last step */
     ascc_engine engine;

@@ -103,6 +103,9 @@ class ModelInfo(Sized):
         ("time_step_min", c_double),
         ("time_step_max", c_double),
         ("multiply_adds", c_double),
+        ("gravity_min", c_double),
+        ("gravity_max", c_double),
+        ("way_max", c_double),
     ]
 
 
@@ -228,7 +231,7 @@ class StepOptions(Sized):
         ("length_unit", c_double),
         ("max_displacement", c_double),
         ("max_neighbors", c_int32),
-        ("reserved", c_int32),
+        ("substeps", c_int32),
     ]
 
 
@@ -269,6 +272,7 @@ class StepStatistics(Sized):
         ("compression_before", Compression),
         ("compression_after", Compression),
         ("sweeps", c_uint64),
+        ("substeps_total", c_uint64),
     ]
 
 

@@ -195,6 +195,9 @@ class ModelInfo:
     time_step: float
     time_step_min: float
     time_step_max: float
+    gravity_min: float
+    gravity_max: float
+    way_max: float
     gravity: Tuple[float, ...]
     particle_spacing: float
     rest_density: float
@@ -751,6 +754,7 @@ class Statistics:
     compression_before: Compression
     compression_after: Compression
     sweeps: int
+    substeps_total: int
 
 
 class Step(_Handle):
@@ -760,6 +764,7 @@ class Step(_Handle):
     length_unit       metres in one unit of length, as the particles'
     max_displacement  length unit that a particle may move in a step; 0 = 64 spacings
     max_neighbors     of one point; 0 = 4096
+    substeps          a time step is cut into: 0 = what the model's range asks for, n = at most n, -1 = none
     context           whose threads are used; None = the model's
     """
 
@@ -773,6 +778,7 @@ class Step(_Handle):
         length_unit: float = 1.0,
         max_displacement: float = 0.0,
         max_neighbors: int = 0,
+        substeps: int = 0,
         context: Optional[Context] = None,
     ) -> None:
         self.context = context or model.context
@@ -781,6 +787,7 @@ class Step(_Handle):
             length_unit=length_unit,
             max_displacement=max_displacement,
             max_neighbors=_int32("max_neighbors", max_neighbors),
+            substeps=_int32("substeps", substeps),
         )
         handle = ctypes.c_void_p()
         self.context._check(
