@@ -78,6 +78,11 @@ words='sim demo dam-break-2d --size 6'
     refuses 1 "/dev/null/f" $words -n 1 --frames /dev/null/f
     refuses 2 "one FILE is wanted" info
     refuses 2 "a SEQUENCE and -o DIR are wanted" show
+    refuses 2 "MODEL and SCENE, or a SEQUENCE is wanted" view
+    refuses 2 "MODEL and SCENE, or a SEQUENCE is wanted" view a.safetensors --model demo
+    refuses 2 "one argument too many: c" view a b c
+    refuses 2 "--ball 0: a number" view demo dam-break-2d --ball 0
+    refuses 1 "none: No such file" view none
     refuses 2 "--every 0: no value that it takes" show none -o shown --every 0
     refuses 1 "none: No such file" show none -o shown
     refuses 1 "no folder of models has 'none.safetensors'" info none
@@ -102,7 +107,7 @@ refuses 2 "'conv' is no command; did you mean 'convert'?" conv
 refuses 2 "'-x' is no option; ascc --help tells more" -x
 refuses 2 "'nothing-like-it' is no command; ascc --help tells more" help nothing-like-it
 # Every option that a help text tells is known where its last letter is missing.
-for command in sim show generate lint eval relax train convert; do
+for command in sim show view generate lint eval relax train convert; do
     "$ascc" $command --help | grep -oE -e '--[a-z]{3,}[a-z-]*' | sort -u >options
     for option in $(grep -v -x -e --help options); do
         refuses 2 "unknown option: ${option%?}; did you mean '$option'?" $command "${option%?}" x

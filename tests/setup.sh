@@ -41,7 +41,7 @@ setup_optional() {
         >/dev/null 2>&1 && echo "Installed: $*"
 }
 
-# What tests/cross_test.sh needs for some machines, and tests/embed_test.sh, and is small; for root only. Where they are it also
+# What tests/cross_test.sh needs for some machines, tests/embed_test.sh and tests/view_test.sh, and is small; for root only. Where they are it also
 # uses gcc-mingw-w64-x86-64-posix with wine, and emscripten with nodejs.
 setup_cross() {
     [ "$(id -u)" -eq 0 ] && command -v apt-get >/dev/null 2>&1 || return 0
@@ -50,5 +50,7 @@ setup_cross() {
     setup_optional s390x-linux-gnu-gcc gcc-s390x-linux-gnu libc6-dev-s390x-cross
     setup_optional i686-linux-gnu-gcc gcc-i686-linux-gnu libc6-dev-i386-cross
     setup_optional cmake cmake # tests/embed_test.sh
+    setup_optional sdl2-config libsdl2-dev # ascc view
+    setup_optional Xvfb xvfb               # tests/view_test.sh
     return 0
 }

@@ -2,8 +2,10 @@
  * SPDX-License-Identifier: MIT */
 #include "arguments.h"
 
+#include <errno.h>
 #include <stddef.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include "console.h"
@@ -84,4 +86,33 @@ bool ascc_bad_option(const char *command, const char *const *known, const char *
     ascc_line(stderr, "ascc %s: %s %s: no value that it takes; ascc %s --help tells more", command,
               name, value, command);
     return false;
+}
+
+bool ascc_read_whole(const char *command, const char *name, const char *text, long low, long high,
+                     int32_t *value)
+{
+    char *end;
+    errno = 0;
+    const long n = strtol(text, &end, 10);
+    if (errno || *end || end == text || n < low || n > high) {
+        ascc_line(stderr, "ascc %s: %s %s: a whole number from %ld to %ld is wanted", command, name,
+                  text, low, high);
+        return false;
+    }
+    *value = (int32_t)n;
+    return true;
+}
+
+bool ascc_read_real(const char *command, const char *name, const char *text, double low,
+                    double high, double *value)
+{
+    char *end;
+    const double x = strtod(text, &end);
+    if (*end || end == text || !(x >= low && x <= high)) {
+        ascc_line(stderr, "ascc %s: %s %s: a number from %g to %g is wanted", command, name, text,
+                  low, high);
+        return false;
+    }
+    *value = x;
+    return true;
 }

@@ -4,6 +4,7 @@
 #define ASCC_ARGUMENTS_H
 
 #include <stdbool.h>
+#include <stdint.h>
 
 /* The word of a NULL-terminated list that was probably meant: one begun but not finished, or a few letters
  * away. NULL if none is near. */
@@ -18,5 +19,11 @@ bool ascc_bad_option(const char *command, const char *const *known, const char *
  * WORD and known may be NULL. False. */
 bool ascc_bad_use(const char *command, const char *what, const char *word,
                   const char *const *known);
+
+/* The value of an option in [low, high]; false and a line on stderr where it is none. */
+bool ascc_read_whole(const char *command, const char *name, const char *text, long low, long high,
+                     int32_t *value);
+bool ascc_read_real(const char *command, const char *name, const char *text, double low,
+                    double high, double *value);
 
 #endif

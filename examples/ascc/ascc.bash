@@ -20,7 +20,7 @@ _ascc() {
         words=$("$program" "$command" --help 2>/dev/null | grep -oE '(^|[[ ])--?[a-z]+(-[a-z]+)*' | tr -d '[ ')
     else
         case $command in
-        sim) words="demo $(_ascc_models "$program") $("$program" sim --help | grep -oE '[a-z-]+-[23]d')" ;;
+        sim | view) words="demo $(_ascc_models "$program") $("$program" sim --help | grep -oE '[a-z-]+-[23]d')" ;;
         eval) words="ballistic sph: pbf: demo $(_ascc_models "$program")" ;;
         info | relax) words=$(_ascc_models "$program") ;;
         generate) words=$("$program" generate --help | sed -n 's/^  \([a-z0-9-]*\)  .*/\1/p') ;;

@@ -7,6 +7,7 @@
 int ascc_command_sim(int argc, char **argv);
 int ascc_command_info(int argc, char **argv);
 int ascc_command_show(int argc, char **argv);
+int ascc_command_view(int argc, char **argv);
 int ascc_command_generate(int argc, char **argv);
 int ascc_command_lint(int argc, char **argv);
 int ascc_command_eval(int argc, char **argv);

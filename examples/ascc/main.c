@@ -16,6 +16,7 @@ static const struct {
     {"sim", "run a model on a scene", ascc_command_sim},
     {"info", "describe a model or sequence file", ascc_command_info},
     {"show", "draw a sequence's frames", ascc_command_show},
+    {"view", "a window on a running model or a sequence", ascc_command_view},
     {"generate", "make sequences with the reference solver", ascc_command_generate},
     {"lint", "check sequences for spikes, escapes and clumps", ascc_command_lint},
     {"eval", "measure a method on true sequences", ascc_command_eval},

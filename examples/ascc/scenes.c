@@ -5,6 +5,9 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
+
+#include "arguments.h"
 
 /* Wall points lie this far apart, in particle spacings: about 980 a square metre at 0.05 m, what the
  * published networks were trained with. */
@@ -205,4 +208,49 @@ bool ascc_scene_make(const char *name, int32_t dimension, int32_t size, double s
         return false;
     }
     return true;
+}
+
+/* Adds the scene that was probably meant to an error. */
+static void suggest_scene(const char *scene, char *error, size_t capacity)
+{
+    enum { MOST = 16 };
+    char names[2 * MOST][64];
+    const char *known[2 * MOST + 1] = {NULL};
+    for (size_t i = 0; i < MOST && ascc_scene_names[i].name; i++)
+        for (size_t k = 2 * i; k < 2 * i + 2; k++) {
+            (void)snprintf(names[k], sizeof names[k], "%s-%dd", ascc_scene_names[i].name,
+                           k % 2 ? 3 : 2);
+            known[k] = names[k];
+        }
+    const char *meant = ascc_nearest(scene, known);
+    const size_t length = strlen(error);
+    if (meant)
+        (void)snprintf(error + length, capacity - length, "; did you mean '%s'?", meant);
+}
+
+bool ascc_scene_load(const char *text, int32_t size, double spacing, ascc_sequence *scene,
+                     char *error, size_t capacity)
+{
+    size_t length = strlen(text);
+    const char *end = text + (length > 3 ? length - 3 : 0);
+    const bool flat = strcmp(end, "-2d") == 0, deep = strcmp(end, "-3d") == 0;
+    char name[64];
+    length -= flat || deep ? 3 : 0;
+    (void)snprintf(name, sizeof name, "%.*s", (int)(length < 63 ? length : 63), text);
+    bool known = flat || deep;
+    for (const ascc_scene_name *s = ascc_scene_names; s->name; s++)
+        known = known || strcmp(s->name, name) == 0;
+    const bool file = access(text, F_OK) == 0;
+    const bool good =
+        known && !file ? ascc_scene_make(name, flat ? 2 : 3, size, spacing, scene, error, capacity)
+                       : ascc_sequence_read(text, scene, error, capacity);
+    if (!good && !file)
+        suggest_scene(text, error, capacity);
+    return good;
+}
+
+void ascc_scene_list(FILE *to)
+{
+    for (const ascc_scene_name *s = ascc_scene_names; s->name; s++)
+        fprintf(to, "         %s-2d, %s-3d: %s\n", s->name, s->name, s->text);
 }

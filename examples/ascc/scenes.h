@@ -2,6 +2,8 @@
 #ifndef ASCC_SCENES_H
 #define ASCC_SCENES_H
 
+#include <stdio.h>
+
 #include "sequence.h"
 
 /* Names with what they show, for a help text; ends with NULL. */
@@ -21,5 +23,11 @@ extern const ascc_scene_name ascc_scene_names[];
  */
 bool ascc_scene_make(const char *name, int32_t dimension, int32_t size, double spacing,
                      ascc_sequence *scene, char *error, size_t capacity);
+
+/* What a command line calls a scene: a sequence file, or NAME-2d, NAME-3d or NAME (3D) of a built-in one. */
+bool ascc_scene_load(const char *text, int32_t size, double spacing, ascc_sequence *scene,
+                     char *error, size_t capacity);
+/* The built-in scenes, for a help text. */
+void ascc_scene_list(FILE *to);
 
 #endif

@@ -1,12 +1,10 @@
 /* ascc sim: runs a model on a scene and writes what happens. SPDX-License-Identifier: MIT */
-#include <errno.h>
 #include <inttypes.h>
 #include <math.h>
 #include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <unistd.h>
 
 #include "arguments.h"
 #include "commands.h"
@@ -38,8 +36,7 @@ static void usage(FILE *to)
         "MODEL  a model by name (water3d) or file, a published network, or demo (a demonstration\n"
         "       model, not trained)\n"
         "SCENE  a sequence file, whose first frame starts the run, or one of (3D without -2d)\n");
-    for (const ascc_scene_name *s = ascc_scene_names; s->name; s++)
-        fprintf(to, "         %s-2d, %s-3d: %s\n", s->name, s->name, s->text);
+    ascc_scene_list(to);
     fprintf(to,
             "\n"
             "  -n STEPS           time steps\n"
@@ -71,32 +68,6 @@ static bool bad_use(const char *what, const char *value)
 
 /* ---- Arguments ---- */
 
-static bool whole(const char *name, const char *text, long low, long high, int32_t *value)
-{
-    char *end;
-    errno = 0;
-    const long n = strtol(text, &end, 10);
-    if (errno || *end || end == text || n < low || n > high) {
-        ascc_line(stderr, "ascc sim: %s %s: a whole number from %ld to %ld is wanted", name, text,
-                  low, high);
-        return false;
-    }
-    *value = (int32_t)n;
-    return true;
-}
-
-static bool real(const char *name, const char *text, double low, double high, double *value)
-{
-    char *end;
-    *value = strtod(text, &end);
-    if (*end || end == text || !(*value >= low && *value <= high)) {
-        ascc_line(stderr, "ascc sim: %s %s: a number from %g to %g is wanted", name, text, low,
-                  high);
-        return false;
-    }
-    return true;
-}
-
 /* Two or three numbers; *count says how many. */
 static bool vector(const char *name, const char *text, double value[3], int32_t *count)
 {
@@ -120,7 +91,7 @@ static bool vector(const char *name, const char *text, double value[3], int32_t 
 static bool read_option(options *o, const char *name, const char *value)
 {
     if (strcmp(name, "-n") == 0)
-        return whole(name, value, 1, 100000000, &o->steps);
+        return ascc_read_whole("sim", name, value, 1, 100000000, &o->steps);
     if (strcmp(name, "-o") == 0)
         return (o->out = value) != NULL;
     if (strcmp(name, "--frames") == 0)
@@ -130,19 +101,19 @@ static bool read_option(options *o, const char *name, const char *value)
     if (strcmp(name, "--vtk") == 0)
         return (o->vtk = value) != NULL;
     if (strcmp(name, "--every") == 0)
-        return whole(name, value, 1, 100000000, &o->every);
+        return ascc_read_whole("sim", name, value, 1, 100000000, &o->every);
     if (strcmp(name, "--threads") == 0)
-        return whole(name, value, 1, 1024, &o->threads);
+        return ascc_read_whole("sim", name, value, 1, 1024, &o->threads);
     if (strcmp(name, "--size") == 0)
-        return whole(name, value, 4, 1000, &o->size);
+        return ascc_read_whole("sim", name, value, 4, 1000, &o->size);
     if (strcmp(name, "--dt") == 0)
-        return real(name, value, 1e-9, 1e9, &o->time_step);
+        return ascc_read_real("sim", name, value, 1e-9, 1e9, &o->time_step);
     if (strcmp(name, "--spacing") == 0)
-        return real(name, value, 1e-6, 1e6, &o->spacing);
+        return ascc_read_real("sim", name, value, 1e-6, 1e6, &o->spacing);
     if (strcmp(name, "--ladder") == 0)
         return (o->rungs = value) != NULL;
     if (strcmp(name, "--budget") == 0)
-        return real(name, value, 1e-3, 1e9, &o->budget);
+        return ascc_read_real("sim", name, value, 1e-3, 1e9, &o->budget);
     if (strcmp(name, "--gravity") == 0)
         return vector(name, value, o->gravity, &o->gravity_count);
     if (strcmp(name, "--velocity") == 0 && strcmp(value, "stored") == 0)
@@ -185,46 +156,6 @@ static bool read_arguments(options *o, int argc, char **argv)
 }
 
 /* ---- The scene ---- */
-
-/* Adds the scene that was probably meant to an error. */
-static void suggest_scene(const char *scene, char *error, size_t capacity)
-{
-    enum { MOST = 16 };
-    char names[2 * MOST][64];
-    const char *known[2 * MOST + 1] = {NULL};
-    for (size_t i = 0; i < MOST && ascc_scene_names[i].name; i++)
-        for (size_t k = 2 * i; k < 2 * i + 2; k++) {
-            (void)snprintf(names[k], sizeof names[k], "%s-%dd", ascc_scene_names[i].name,
-                           k % 2 ? 3 : 2);
-            known[k] = names[k];
-        }
-    const char *meant = ascc_nearest(scene, known);
-    const size_t length = strlen(error);
-    if (meant)
-        (void)snprintf(error + length, capacity - length, "; did you mean '%s'?", meant);
-}
-
-/* What is no file and is named NAME-2d, NAME-3d or NAME (3D) is a built-in scene. */
-static bool load_scene(const options *o, double spacing, ascc_sequence *scene, char *error,
-                       size_t capacity)
-{
-    size_t length = strlen(o->scene);
-    const char *end = o->scene + (length > 3 ? length - 3 : 0);
-    const bool flat = strcmp(end, "-2d") == 0, deep = strcmp(end, "-3d") == 0;
-    char name[64];
-    length -= flat || deep ? 3 : 0;
-    (void)snprintf(name, sizeof name, "%.*s", (int)(length < 63 ? length : 63), o->scene);
-    bool known = flat || deep;
-    for (const ascc_scene_name *s = ascc_scene_names; s->name; s++)
-        known = known || strcmp(s->name, name) == 0;
-    const bool file = access(o->scene, F_OK) == 0;
-    const bool good = known && !file ? ascc_scene_make(name, flat ? 2 : 3, o->size, spacing, scene,
-                                                       error, capacity)
-                                     : ascc_sequence_read(o->scene, scene, error, capacity);
-    if (!good && !file)
-        suggest_scene(o->scene, error, capacity);
-    return good;
-}
 
 /* Positions and velocities that start the run; from differences: frame 1, (frame 1 - frame 0) / dt. */
 static bool start_of(const options *o, ascc_sequence *s, const float **position, char *error,
@@ -512,7 +443,8 @@ static bool open_model(simulation *s)
     if (status == ASCC_OK && !demo)
         status = ascc_model_get_info(s->model, &info);
     const double spacing = o->spacing > 0.0 ? o->spacing : info.particle_spacing;
-    if (status == ASCC_OK && !load_scene(o, spacing, &s->scene, s->error, sizeof s->error))
+    if (status == ASCC_OK &&
+        !ascc_scene_load(o->scene, o->size, spacing, &s->scene, s->error, sizeof s->error))
         return false;
     if (status == ASCC_OK && demo)
         status = ascc_host_model(s->context, o->model, s->scene.dimension, 2.0 * s->scene.radius,
