@@ -324,7 +324,7 @@ refuses 1 "unknown: architecture 'conv': 'window' is not understood" train unkno
 
 for example in "$source"/examples/train/*.json; do
     [ -f "$example" ] || continue
-    sed -e 's#"[^"]*/\(liquid3d\|wbc2d\|data2d\|data3d\)/[^"]*"#"data/*"#g' \
+    sed -e 's#"[^"]*/\(liquid3d\|wbc2d\|data2d\|data3d\|steps3d\)/[^"]*"#"data/*"#g' \
         -e "s#\"model\": \"[^\"]*\"#\"model\": \"$source/examples/models/water3d.safetensors\"#" \
         "$example" >example.json
     sed -i "s|\"output\": \"[^\"]*/[^\"]*\"|\"output\": \"$folder/nowhere/deep/m.safetensors\"|" example.json

@@ -7,6 +7,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "system.h"
+
 const char *const ascc_architecture_kernels[2] = {"basis", "grid"};
 const char *const ascc_architecture_outputs[2] = {"plain", "antisymmetric"};
 const char *const ascc_architecture_projections[2] = {"none", "radial"};
@@ -72,7 +74,7 @@ static void put(bytes *b, const void *from, size_t size)
     b->data[b->length] = '\0';
 }
 
-static void add(bytes *b, const char *format, ...) __attribute__((format(printf, 2, 3)));
+static void add(bytes *b, const char *format, ...) ASCC_FORMAT(2, 3);
 static void add(bytes *b, const char *format, ...)
 {
     char text[512];

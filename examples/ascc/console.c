@@ -3,13 +3,11 @@
 #include "console.h"
 
 #include <errno.h>
-#include <fcntl.h>
 #include <stdarg.h>
 #include <stdbool.h>
 #include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
-#include <unistd.h>
 
 /* Characters that move the cursor, end the line or turn the direction of writing. */
 static bool controls(uint32_t code)
@@ -59,14 +57,6 @@ void ascc_line(FILE *to, const char *format, ...)
     ascc_printable(text);
     (void)fputs(text, to);
     (void)fputc('\n', to);
-}
-
-/* Opened so that what is meant for the stream fails, as it does on a closed one. */
-void ascc_console_open(void)
-{
-    for (int stream = 0; stream < 3; stream++)
-        if (fcntl(stream, F_GETFD) < 0)
-            (void)open("/dev/null", stream == 0 ? O_WRONLY : O_RDONLY);
 }
 
 int ascc_console_close(int status)

@@ -5,20 +5,16 @@
 
 #include <stdio.h>
 
+#include "system.h"
+
 /* Prints one line, whatever the texts in it hold: names, descriptions, paths and messages come from
  * files. The newline is added. Texts of the program's own may be printed as they are. */
-void ascc_line(FILE *to, const char *format, ...)
-#if defined(__GNUC__)
-    __attribute__((format(printf, 2, 3)))
-#endif
-    ;
+void ascc_line(FILE *to, const char *format, ...) ASCC_FORMAT(2, 3);
 
 /* What a terminal would obey and not show, and what is no UTF-8, becomes '?'. */
 void ascc_printable(char *text);
 
-/* At the program's start: no file that it opens takes the place of a standard stream that is closed. */
-void ascc_console_open(void);
-/* At its end: the exit status, 1 in place of 0 where standard output did not take all. */
+/* At the program's end: the exit status, 1 in place of 0 where standard output did not take all. */
 int ascc_console_close(int status);
 
 #endif

@@ -3,7 +3,6 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/stat.h>
 
 #include "arguments.h"
 #include "commands.h"
@@ -12,6 +11,7 @@
 #include "host.h"
 #include "published.h"
 #include "tensor_file.h"
+#include "system.h"
 
 static int usage(void)
 {
@@ -33,12 +33,6 @@ static int failed(const char *path, const char *why)
 {
     ascc_line(stderr, "ascc convert: %s: %s", path, why);
     return 1;
-}
-
-static bool same_file(const char *a, const char *b)
-{
-    struct stat x, y;
-    return stat(a, &x) == 0 && stat(b, &y) == 0 && x.st_dev == y.st_dev && x.st_ino == y.st_ino;
 }
 
 /* Bytes of the model file, from malloc; NULL after failed. */
@@ -112,7 +106,7 @@ int ascc_command_convert(int argc, char **argv)
         return ascc_bad_use("convert", "one SEQUENCE is wanted, and no -o", NULL, NULL), 2;
     if (!in || !out)
         return ascc_bad_use("convert", "a network and -o FILE are wanted", NULL, NULL), 2;
-    if (same_file(in, out))
+    if (ascc_system_same(in, out))
         return failed(out, "is the network that is to be converted");
     size_t size;
     unsigned char *bytes = convert(in, &size);

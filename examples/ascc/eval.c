@@ -7,13 +7,13 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <unistd.h>
 
 #include "arguments.h"
 #include "commands.h"
 #include "console.h"
 #include "evaluate.h"
 #include "new_file.h"
+#include "system.h"
 
 enum { MOST_SEQUENCES = 256, COLUMNS = 5 };
 
@@ -164,7 +164,7 @@ static void print_failure(const char *sequence, const ascc_method *method, const
     const char *known[MOST + 2] = {"demo"}, *meant = NULL;
     for (size_t k = 0; k < MOST && ascc_methods[k]; k++)
         known[k + 1] = ascc_methods[k]->prefix;
-    if (!method->prefix[0] && access(word, F_OK) != 0)
+    if (!method->prefix[0] && !ascc_system_there(word))
         meant = ascc_nearest(word, known);
     ascc_line(stderr, "ascc eval: %s: %s%s%s%s", sequence, why, meant ? "; did you mean '" : "",
               meant ? meant : "", meant ? "'?" : "");

@@ -4,7 +4,6 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/stat.h>
 
 #include "arguments.h"
 #include "commands.h"
@@ -14,6 +13,7 @@
 #include "progress.h"
 #include "recipes.h"
 #include "sequence.h"
+#include "system.h"
 
 typedef struct request {
     const char *kind, *directory;
@@ -139,12 +139,6 @@ static bool make_sequence(const request *q, const char *path, uint64_t number, i
 
 /* ---- All of them ---- */
 
-static bool exists(const char *path)
-{
-    struct stat status;
-    return stat(path, &status) == 0;
-}
-
 static void *work(void *data)
 {
     job *j = data;
@@ -158,7 +152,7 @@ static void *work(void *data)
         char path[4096], error[512] = "";
         (void)snprintf(path, sizeof path, "%s/%s_%llu_%04ld.safetensors", q->directory, q->kind,
                        (unsigned long long)q->recipe.seed, number);
-        const bool there = exists(path);
+        const bool there = ascc_system_there(path);
         const bool good = there || make_sequence(q, path, (uint64_t)number, j->solver_threads,
                                                  error, sizeof error);
         pthread_mutex_lock(&j->lock);

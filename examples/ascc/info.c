@@ -3,13 +3,13 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <unistd.h>
 
 #include "arguments.h"
 #include "commands.h"
 #include "console.h"
 #include "host.h"
 #include "tensor_file.h"
+#include "system.h"
 
 static void print_model(const char *path, const ascc_model_info *m)
 {
@@ -126,7 +126,7 @@ int ascc_command_info(int argc, char **argv)
     if (argv[0][0] == '-')
         return ascc_bad_use("info", "unknown option", argv[0], NULL), 2;
     char format[64] = "", why[512];
-    if (access(argv[0], F_OK) != 0)
+    if (!ascc_system_there(argv[0]))
         return describe_model(argv[0]); /* which tells the reason */
     if (!read_format(argv[0], format, sizeof format, why, sizeof why)) {
         ascc_line(stderr, "ascc info: %s: %s", argv[0], why);

@@ -8,6 +8,7 @@
 #include "arguments.h"
 #include "commands.h"
 #include "console.h"
+#include "system.h"
 
 static const struct {
     const char *name, *text;
@@ -92,6 +93,6 @@ static int run(int argc, char **argv)
 
 int main(int argc, char **argv)
 {
-    ascc_console_open();
+    ascc_system_start(&argc, &argv);
     return ascc_console_close(run(argc, argv));
 }

@@ -13,16 +13,16 @@
 
 #include <jansson.h>
 
+#include "system.h"
+
 typedef struct ascc_members {
     json_t *taken;   /* a list that keeps alive what was taken; the caller's to make and to free */
     char where[64];  /* begins every message */
     char error[256]; /* "" = no fault so far */
 } ascc_members;
 
-void ascc_members_where(ascc_members *members, const char *format, ...)
-    __attribute__((format(printf, 2, 3)));
-void ascc_members_fail(ascc_members *members, const char *format, ...)
-    __attribute__((format(printf, 2, 3)));
+void ascc_members_where(ascc_members *members, const char *format, ...) ASCC_FORMAT(2, 3);
+void ascc_members_fail(ascc_members *members, const char *format, ...) ASCC_FORMAT(2, 3);
 bool ascc_members_good(const ascc_members *members);
 
 /* Required members. Numbers must lie in [low, high]. Objects and lists are NULL after a fault. */

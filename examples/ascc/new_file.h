@@ -24,6 +24,8 @@ bool ascc_new_file_close(ascc_new_file *file, bool keep, char *error, size_t cap
 
 /* Could a file be written there? For what is written only after the work. */
 bool ascc_new_file_check(const char *path, char *error, size_t capacity);
+/* The folder that a path lies in. */
+void ascc_folder_of(const char *path, char folder[ASCC_NEW_FILE_PATH]);
 /* Makes the folder if it is not there, and tells whether files can be written into it. */
 bool ascc_make_folder(const char *path, char *error, size_t capacity);
 /* A nameless file on the same disk, gone when it is closed; NULL with errno. */

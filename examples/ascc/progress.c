@@ -4,7 +4,8 @@
 #include <math.h>
 #include <stdio.h>
 #include <time.h>
-#include <unistd.h>
+
+#include "system.h"
 
 #define WIDTH 30
 
@@ -43,7 +44,7 @@ void ascc_progress_start(ascc_progress *p, const char *label, size_t total)
     p->work = p->work_left = 0.0;
     p->total = total;
     p->started = p->drawn = now();
-    p->visible = isatty(STDERR_FILENO) != 0;
+    p->visible = ascc_system_is_terminal(stderr);
     if (p->visible)
         draw(p, p->started);
 }

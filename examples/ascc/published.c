@@ -9,6 +9,7 @@
 
 #include "members.h"
 #include "network_writer.h"
+#include "system.h"
 #include "tensor_file.h"
 
 #define SPACINGS_PER_EXTENT 4.5 /* CConv: a filter reaches across 9 particle radii */
@@ -99,8 +100,7 @@ static bool match_all(const char *text, const char *pattern, double *number)
 }
 
 /* Adds to a text of limited size; what does not fit makes it differ from any other. */
-static void append(char *text, size_t capacity, const char *format, ...)
-    __attribute__((format(printf, 3, 4)));
+static void append(char *text, size_t capacity, const char *format, ...) ASCC_FORMAT(3, 4);
 static void append(char *text, size_t capacity, const char *format, ...)
 {
     const size_t length = strlen(text);

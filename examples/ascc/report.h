@@ -7,6 +7,8 @@
 #include <stddef.h>
 #include <stdio.h>
 
+#include "system.h"
+
 enum { ASCC_REPORT_FIGURES = 96 };
 
 typedef struct ascc_figure {
@@ -23,11 +25,7 @@ typedef struct ascc_report_run {
 } ascc_report_run;
 
 /** Adds a figure; the name is formatted. */
-void ascc_report_add(ascc_report_run *run, double value, const char *name, ...)
-#if defined(__GNUC__)
-    __attribute__((format(printf, 3, 4)))
-#endif
-    ;
+void ascc_report_add(ascc_report_run *run, double value, const char *name, ...) ASCC_FORMAT(3, 4);
 
 /** Rows are figures, columns are runs, `columns` at a time. */
 void ascc_report_table(FILE *file, const char *method, const ascc_report_run *runs, size_t count,

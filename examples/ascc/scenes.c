@@ -5,9 +5,9 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <unistd.h>
 
 #include "arguments.h"
+#include "system.h"
 
 /* Wall points lie this far apart, in particle spacings: about 980 a square metre at 0.05 m, what the
  * published networks were trained with. */
@@ -240,7 +240,7 @@ bool ascc_scene_load(const char *text, int32_t size, double spacing, ascc_sequen
     bool known = flat || deep;
     for (const ascc_scene_name *s = ascc_scene_names; s->name; s++)
         known = known || strcmp(s->name, name) == 0;
-    const bool file = access(text, F_OK) == 0;
+    const bool file = ascc_system_there(text);
     const bool good =
         known && !file ? ascc_scene_make(name, flat ? 2 : 3, size, spacing, scene, error, capacity)
                        : ascc_sequence_read(text, scene, error, capacity);

@@ -15,6 +15,7 @@
 #include "picture.h"
 #include "progress.h"
 #include "scenes.h"
+#include "system.h"
 
 typedef struct options {
     const char *model, *scene, *out, *frames, *ply, *vtk;
@@ -415,9 +416,8 @@ static ascc_status open_rungs(simulation *s, ascc_host_error *why)
             return ASCC_ERROR_ARGUMENT;
         }
         (void)snprintf(name, sizeof name, "%.*s", (int)length, at);
-        const char *slash = strrchr(name, '/');
         (void)snprintf(s->rung_name[s->rung_count], sizeof *s->rung_name, "%.60s",
-                       slash ? slash + 1 : name);
+                       ascc_system_name(name));
         status = ascc_host_load(s->context, name, &s->rung[s->rung_count], why);
         s->rung_count += status == ASCC_OK;
         at += length + (at[length] == ',');

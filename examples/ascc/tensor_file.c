@@ -8,24 +8,27 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/stat.h>
+
+#include "system.h"
 
 #define MAX_HEADER ((size_t)16 << 20)
 
 unsigned char *ascc_tensor_file_read(const char *path, size_t *size, char *error, size_t capacity)
 {
-    struct stat about;
-    FILE *in = fopen(path, "rb");
-    if (!in) {
+    ascc_about about;
+    FILE *in = ascc_system_open(path, "rb");
+    if (!in || !ascc_system_look(path, &about)) {
         (void)snprintf(error, capacity, "%s", strerror(errno));
+        if (in)
+            (void)fclose(in);
         return NULL;
     }
-    if (fstat(fileno(in), &about) != 0 || !S_ISREG(about.st_mode)) {
+    if (!about.regular) {
         (void)fclose(in);
         (void)snprintf(error, capacity, "is no regular file");
         return NULL;
     }
-    *size = (size_t)about.st_size;
+    *size = (size_t)about.size;
     unsigned char *bytes = malloc(*size + 1);
     const bool good = bytes && fread(bytes, 1, *size, in) == *size;
     (void)fclose(in);

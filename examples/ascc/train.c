@@ -12,9 +12,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/stat.h>
 #include <time.h>
-#include <unistd.h>
 
 #include <ascc/train.h>
 #include <jansson.h>
@@ -30,6 +28,7 @@
 #include "tensor_file.h"
 #include "train_config.h"
 #include "train_log.h"
+#include "system.h"
 
 typedef struct training {
     const char *path; /* of the config */
@@ -81,7 +80,7 @@ static uint64_t schedule_end(const training *t)
 
 static unsigned char *read_whole(training *t, const char *path, size_t *size)
 {
-    FILE *file = fopen(path, "rb");
+    FILE *file = ascc_system_open(path, "rb");
     unsigned char *bytes = NULL;
     *size = 0;
     if (file && fseek(file, 0, SEEK_END) == 0 && ftell(file) > 0) {
@@ -114,12 +113,6 @@ static bool write_model(training *t, const char *path)
 
 /* ---- Sequences ------------------------------------------------------------------------------------ */
 
-static const char *last_name(const char *path)
-{
-    const char *slash = strrchr(path, '/');
-    return slash ? slash + 1 : path;
-}
-
 static bool add_sequence(training *t, const ascc_train_source *source)
 {
     ascc_sequence s;
@@ -135,7 +128,7 @@ static bool add_sequence(training *t, const ascc_train_source *source)
         (void)ascc_thin_frames(s.normal, walls, s.frames, every);
     }
     const ascc_training_sequence sequence = {.size = sizeof sequence,
-                                             .name = last_name(source->path),
+                                             .name = ascc_system_name(source->path),
                                              .frame_count = frames,
                                              .fluid_count = s.count,
                                              .boundary_count = s.walls,
@@ -264,7 +257,7 @@ static bool save(training *t)
     if (ascc_trainer_save(t->trainer, c->checkpoint) != ASCC_OK) {
         (void)snprintf(t->error, sizeof t->error, "%.200s: %.200s; %s", c->checkpoint,
                        ascc_trainer_message(t->trainer),
-                       access(c->checkpoint, F_OK) == 0 ? "the checkpoint from before is whole"
+                       ascc_system_there(c->checkpoint) ? "the checkpoint from before is whole"
                                                         : "there is no checkpoint yet");
         return false;
     }
@@ -345,11 +338,7 @@ static bool iterate(training *t)
 /* Whatever ends the run, the weights that are there are good ones: they are saved. */
 static bool run(training *t)
 {
-    const struct sigaction catch = {.sa_handler = on_interrupt, .sa_flags = (int)SA_RESETHAND};
-    const struct sigaction ignore = {.sa_handler = SIG_IGN};
-    (void)sigaction(SIGINT, &catch, NULL);
-    (void)sigaction(SIGTERM, &catch, NULL);
-    (void)sigaction(SIGXFSZ, &ignore, NULL); /* a file too large is an error like a full disk */
+    ascc_system_on_interrupt(on_interrupt);
     t->saved = now();
     (void)snprintf(t->label, sizeof t->label, "training");
     ascc_progress_start(&t->progress, t->label, (size_t)t->end);
@@ -494,7 +483,7 @@ static bool create_trainer(training *t)
 static bool load_checkpoint(training *t)
 {
     const char *path = t->config.checkpoint;
-    const bool there = access(path, F_OK) == 0;
+    const bool there = ascc_system_there(path);
     if (there && !t->resume)
         return fail(t, path, "is there already: --resume goes on from it; move it to begin anew");
     if (!there && t->resume)
@@ -507,12 +496,9 @@ static bool load_checkpoint(training *t)
 /* The folder of the output, if only that is missing. */
 static void make_folder(const char *path)
 {
-    char folder[ASCC_TRAIN_PATH];
-    const char *slash = strrchr(path, '/');
-    if (!slash || slash == path)
-        return;
-    (void)snprintf(folder, sizeof folder, "%.*s", (int)(slash - path), path);
-    (void)mkdir(folder, 0777);
+    char folder[ASCC_NEW_FILE_PATH];
+    ascc_folder_of(path, folder);
+    (void)ascc_system_make_folder(folder);
 }
 
 /* Told before the work what would fail after it. */
@@ -615,8 +601,7 @@ static bool read_arguments(training *t, int argc, char **argv)
             return ascc_bad_option("train", options, argv[i], argv[i + 1]);
         }
     }
-    const long processors = sysconf(_SC_NPROCESSORS_ONLN);
-    t->threads = threads ? (int32_t)threads : processors > 0 ? (int32_t)processors : 1;
+    t->threads = threads ? (int32_t)threads : ascc_system_processors();
     return t->path || ascc_bad_use("train", "a CONFIG is wanted", NULL, NULL);
 }
 

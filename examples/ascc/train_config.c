@@ -2,7 +2,6 @@
 #include "train_config.h"
 
 #include <errno.h>
-#include <glob.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -10,6 +9,7 @@
 #include "architecture.h"
 #include "members.h"
 #include "network_writer.h"
+#include "system.h"
 
 static const char SUFFIX[] = ".safetensors";
 static const double MANY = 1e9;
@@ -77,7 +77,7 @@ static bool has_controls(const char *path)
 
 static void join(reading *g, const char *path, char into[ASCC_TRAIN_PATH])
 {
-    const char *folder = path[0] == '/' ? "" : g->folder;
+    const char *folder = ascc_system_is_absolute(path) ? "" : g->folder;
     if (!path[0])
         ascc_members_fail(&g->r, "a path is empty");
     else if (has_controls(
@@ -125,32 +125,21 @@ static void add_source(reading *g, ascc_train_sources *list, const char *path,
     list->source[list->count++] = source;
 }
 
-/* The folder is meant as it is, only what the file says is a pattern. */
-static bool write_pattern(const reading *g, const char *path, char *into, size_t capacity)
-{
-    size_t used = 0;
-    for (const char *c = path[0] == '/' ? "" : g->folder; *c && used + 2 < capacity; c++) {
-        if (strchr("*?[]\\", *c))
-            into[used++] = '\\';
-        into[used++] = *c;
-    }
-    return snprintf(into + used, capacity - used, "%s", path) < (int)(capacity - used);
-}
-
 /* All files that a path or pattern means, in the order of their names. */
 static void add_matches(reading *g, ascc_train_sources *list, const char *path,
                         ascc_train_source source)
 {
-    char pattern[2 * ASCC_TRAIN_PATH];
-    glob_t found = {0};
+    size_t count = 0;
     if (!ascc_members_good(&g->r))
         return;
-    if (!path[0] || !write_pattern(g, path, pattern, sizeof pattern) ||
-        glob(pattern, 0, NULL, &found) != 0 || found.gl_pathc == 0)
+    char **found = path[0] ? ascc_system_match(g->folder, path, &count) : NULL;
+    if (count == 0)
         ascc_members_fail(&g->r, "%.150s: there is no such file", path);
-    for (size_t i = 0; i < found.gl_pathc; i++)
-        add_source(g, list, found.gl_pathv[i], source);
-    globfree(&found);
+    for (size_t i = 0; i < count; i++) {
+        add_source(g, list, found[i], source);
+        free(found[i]);
+    }
+    free(found);
 }
 
 static void read_sources(reading *g, json_t *data, const char *key, ascc_train_sources *list)
@@ -198,7 +187,7 @@ static void read_data(reading *g, json_t *root, ascc_train_config *c)
 static char *read_text(const char *path, size_t *size, char *error, size_t capacity)
 {
     enum { MOST = 1 << 20 };
-    FILE *file = fopen(path, "rb");
+    FILE *file = ascc_system_open(path, "rb");
     char *text = file ? malloc(MOST) : NULL;
     *size = text ? fread(text, 1, MOST - 1, file) : 0;
     const bool good = text && !ferror(file) && *size < MOST - 1;
@@ -457,9 +446,7 @@ bool ascc_train_config_read(const char *path, ascc_train_config *c, char *error,
     json_error_t why;
     json_t *root = json_loadb(text, size, JSON_REJECT_DUPLICATES, &why);
     reading g = {.r = {.taken = json_array()}};
-    const char *slash = strrchr(path, '/');
-    if (slash)
-        (void)snprintf(g.folder, sizeof g.folder, "%.*s", (int)(slash - path + 1), path);
+    (void)snprintf(g.folder, sizeof g.folder, "%.*s", (int)(ascc_system_name(path) - path), path);
     ascc_members_where(&g.r, "config");
     if (!root)
         ascc_members_fail(&g.r, "line %d: %s", why.line, why.text);

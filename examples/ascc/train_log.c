@@ -4,10 +4,10 @@
 #include <errno.h>
 #include <inttypes.h>
 #include <math.h>
-#include <signal.h>
 #include <stdlib.h>
 #include <string.h>
-#include <unistd.h>
+
+#include "system.h"
 
 #define COLUMNS(seconds)                                                                           \
     "learning_rate,loss,gradient_norm," seconds ",steps,ended_early,"                              \
@@ -88,16 +88,16 @@ static long read_rows(FILE *file, uint64_t iteration, ascc_train_log *log)
 bool ascc_train_log_open(const char *path, uint64_t iteration, ascc_train_log *log, char *error,
                          size_t capacity)
 {
-    *log = (ascc_train_log){.file = fopen(path, "r+")};
+    *log = (ascc_train_log){.file = ascc_system_open(path, "r+")};
     if (!log->file && errno == ENOENT)
-        log->file = fopen(path, "w+");
+        log->file = ascc_system_open(path, "w+");
     bool good = log->file != NULL;
     const char *why = NULL;
     if (good) {
         const long end = read_rows(log->file, iteration, log);
         if (end < 0)
             why = "is not the log of a training run, so it is left as it is";
-        good = end >= 0 && fflush(log->file) == 0 && ftruncate(fileno(log->file), end) == 0 &&
+        good = end >= 0 && fflush(log->file) == 0 && ascc_system_cut(log->file, end) &&
                fseek(log->file, end, SEEK_SET) == 0 && (end > 0 || fputs(HEADER, log->file) >= 0) &&
                fflush(log->file) == 0;
     }
@@ -156,7 +156,7 @@ void ascc_train_log_close(ascc_train_log *log)
 /* A path in gnuplot's quotes. It takes a first '<' or '|' for a command to run, '-' for its own input. */
 static void quoted(FILE *file, const char *path)
 {
-    fputs(path[0] == '/' ? "'" : "'./", file);
+    fputs(ascc_system_is_absolute(path) ? "'" : "'./", file);
     for (; *path; path++) {
         if (*path == '\'')
             fputc('\'', file);
@@ -190,18 +190,19 @@ static void write_script(FILE *g, const char *log, const char *chart, bool valid
     fputs("unset multiplot\n", g);
 }
 
+typedef struct chart_job {
+    const char *log, *chart;
+    bool validated;
+} chart_job;
+
+static void write_chart(FILE *gnuplot, const void *data)
+{
+    const chart_job *job = data;
+    write_script(gnuplot, job->log, job->chart, job->validated);
+}
+
 bool ascc_train_log_chart(const char *log, const char *chart, bool validated)
 {
-    if (system("command -v gnuplot >/dev/null 2>&1") != 0)
-        return false;
-    struct sigaction ignore = {.sa_handler = SIG_IGN}, before;
-    (void)sigaction(SIGPIPE, &ignore, &before);
-    FILE *gnuplot = popen("gnuplot >/dev/null 2>&1", "w");
-    bool good = gnuplot != NULL;
-    if (good) {
-        write_script(gnuplot, log, chart, validated);
-        good = pclose(gnuplot) == 0;
-    }
-    (void)sigaction(SIGPIPE, &before, NULL);
-    return good;
+    const chart_job job = {log, chart, validated};
+    return ascc_system_feed("gnuplot", write_chart, &job);
 }

@@ -7,6 +7,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "system.h"
+
 enum { LINES = 10000 };
 
 /* What stands behind the frame. */
@@ -63,7 +65,7 @@ static bool add(ascc_script *script, const char *text)
 bool ascc_script_read(ascc_script *script, const char *path, char *error, size_t capacity)
 {
     char text[1024];
-    FILE *file = fopen(path, "r");
+    FILE *file = ascc_system_open(path, "r");
     *script = (ascc_script){NULL, 0, 0};
     if (!file) {
         (void)snprintf(error, capacity, "%s: %s", path, strerror(errno));
