@@ -185,7 +185,7 @@ SPEED = """## Section 5.4: speed
 
 One thread, CPU time of one step of `bench step --scene block` (no walls); a frame is the model's time step, {frame}. MiB is the scratch of a step. The last column is CPU time of the
 reference SPH of `examples/reference` for a frame of 0.02 s in steps of 1e-4 s ({sph}) over that of the network, per particle, same machine. DualSPHysics 5.4 itself took 203 us a particle and frame at that step in 2D (10,000 particles, measured beside these),
-{dual}. The paper compares a graphics card with one CPU thread; these are one CPU thread both. Farthest points cost the square of the particles: a million would take PointNet++ hours, and it is not asked for them.
+{dual}. The paper compares a graphics card with one CPU thread; these are one CPU thread both. Time does not depend on how long a network was trained: that of PointNet++ in 3D was not, to speak of. Farthest points cost the square of the particles: a million would take PointNet++ hours, and it is not asked for them.
 """
 
 
