@@ -130,6 +130,7 @@ check 'lib never prints, aborts or exits' "$(
 # Public functions that move no floating point number but by memcpy, if at all.
 plain='version|status_text|(train_)?context_.*|[a-z]+_(destroy|message)|model_(save|bytes|find)|trainer_(iteration|parameter_count)'
 plain="$plain|particles_(reserve|remove|clear|count|capacity|dimension|find|snapshot_size|momentum_quantum)"
+plain="$plain|particles_(get_asleep|wake)"
 plain="$plain|ladder_(step|step_count|get_choices|snapshot_size)"
 plain="$plain|particles_(total_momentum|get_(ids|bodies|momentum))"
 plain="$plain|body_remove|bodies_list"

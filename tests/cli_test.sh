@@ -219,6 +219,10 @@ run sim water2d.safetensors dam-break-2d --size 8 -n 20 --ply alone
 holds 'and moves as that model alone' diff -r ladder alone
 run sim --ladder pbf2d.safetensors,water2d.safetensors --budget 0.001 dam-break-2d --size 8 -n 20
 holds 'a ladder without time says that nothing is fast enough' grep -q 'over the budget  *20 of 20 .*no model of the ladder' out
+run sim water2d.safetensors still-column-2d --size 8 -n 400 --sleep 1
+holds 'fluid at rest sleeps when it may' grep -q '^asleep  *[1-9]' out
+holds 'and no quantum is lost' grep -q '^momentum error  *0  (0 0 0 quanta' out
+refuses 2 '--sleep takes a number from 0' sim demo dam-break-2d -n 1 --sleep -1
 refuses 2 '--budget takes a --ladder' sim demo dam-break-2d -n 1 --budget 4
 refuses 1 "cannot open 'none'" sim --ladder none dam-break-2d -n 1
 refuses 1 '--ladder takes 1 to 16 models' sim --ladder pbf2d.safetensors,,x dam-break-2d -n 1

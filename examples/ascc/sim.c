@@ -22,7 +22,7 @@ typedef struct options {
     const char *rungs; /* models by name, commas between them, in place of one */
     double budget;     /* ms a step, 0 = none */
     int32_t steps, every, threads, size;
-    double time_step, spacing;
+    double time_step, spacing, sleep_speed;
     int32_t gravity_count; /* 0 = the scene's */
     bool difference;
     double gravity[3];
@@ -52,6 +52,8 @@ static void usage(FILE *to)
             "  --ladder M,M...    several models, the best last: each step runs the best that the\n"
             "                     budget allows\n"
             "  --budget MS        milliseconds that a step may take, for --ladder\n"
+            "  --sleep V          parts of the fluid slower than V times what gravity gives in a\n"
+            "                     step stop until something wakes them (0 = none)\n"
             "  --size N           particles along a named scene's longest edge\n"
             "  --spacing S        particle spacing of a named scene, metres (the model's)\n"
             "  --velocity KIND    of a sequence: stored (default), or difference of its first\n"
@@ -59,8 +61,8 @@ static void usage(FILE *to)
 }
 
 static const char *const option_names[] = {
-    "-n",        "-o",     "--frames",  "--ply",      "--vtk",    "--every",  "--threads", "--dt",
-    "--gravity", "--size", "--spacing", "--velocity", "--ladder", "--budget", NULL};
+    "-n",        "-o",     "--frames",  "--ply",      "--vtk",   "--every",  "--threads", "--dt",
+    "--gravity", "--size", "--spacing", "--velocity", "--sleep", "--ladder", "--budget",  NULL};
 
 static bool bad_use(const char *what, const char *value)
 {
@@ -121,6 +123,12 @@ static bool read_option(options *o, const char *name, const char *value)
         return true;
     if (strcmp(name, "--velocity") == 0 && strcmp(value, "difference") == 0)
         return o->difference = true;
+    if (strcmp(name, "--sleep") == 0) {
+        char *end;
+        o->sleep_speed = strtod(value, &end);
+        return (end != value && !*end && o->sleep_speed >= 0.0 && o->sleep_speed <= 1e3) ||
+               bad_use("--sleep takes a number from 0 to 1000", value);
+    }
     if (strcmp(name, "--velocity") == 0)
         return bad_use("--velocity takes stored or difference", value);
     return ascc_bad_option("sim", option_names, name, value);
@@ -209,7 +217,8 @@ typedef struct simulation {
     double seconds[ASCC_MAX_STAGES], seconds_total;
     const char *stage[ASCC_MAX_STAGES];
     int32_t stage_count;
-    int64_t drift[3]; /* quanta: what is left of before + external - wall - after */
+    int64_t drift[3]; /* quanta: what is left of before + external - wall - support - after */
+    uint64_t asleep;  /* in the last step */
     ascc_measures first, last;
     double max_density;
     char error[768];
@@ -288,9 +297,10 @@ static void count_step(simulation *s)
     for (int32_t i = 0; i < t.stage_count; i++)
         add_stage(s, &t.stage[i]);
     s->seconds_total += t.seconds_total;
+    s->asleep = t.asleep;
     for (int c = 0; c < 3; c++)
-        s->drift[c] +=
-            t.momentum_before[c] + t.external_impulse[c] - t.wall_impulse[c] - t.momentum_after[c];
+        s->drift[c] += t.momentum_before[c] + t.external_impulse[c] - t.wall_impulse[c] -
+                       t.support_impulse[c] - t.momentum_after[c];
 }
 
 static bool advance(simulation *s)
@@ -393,6 +403,9 @@ static void print_table(const simulation *s)
         ascc_line(stdout, "  %-17s %9.3f us a step", "per particle",
                   1e6 * s->seconds_total / n / (double)s->scene.count);
     print_ladder(s);
+    if (s->o->sleep_speed > 0.0)
+        ascc_line(stdout, "asleep              %" PRIu64 " of %zu particles in the last step",
+                  s->asleep, s->scene.count);
     print_momentum(s);
     ascc_line(stdout, "max. density error  %.1f %%  of rest density, over all frames",
               100.0 * fmax(0.0, s->max_density - 1.0));
@@ -474,7 +487,8 @@ static bool open_step(simulation *s)
         ascc_host_particles(s->context, &s->scene, position, s->scene.velocity, &s->particles) !=
             ASCC_OK)
         return false;
-    const ascc_step_options settings = {.size = sizeof settings, .time_step = s->o->time_step};
+    const ascc_step_options settings = {
+        .size = sizeof settings, .time_step = s->o->time_step, .sleep_speed = s->o->sleep_speed};
     const ascc_ladder_options ladder = {
         .size = sizeof ladder, .budget = 1e-3 * s->o->budget, .step = &settings};
     const ascc_status status =

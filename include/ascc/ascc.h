@@ -414,6 +414,16 @@ ASCC_API ascc_status ascc_particles_body_impulse(const ascc_particles *particles
                                                  const double point[3], int64_t impulse[3],
                                                  double torque[3]);
 
+/**
+ * Which fluid sleeps, after a step with a sleep_speed (docs/sleeping.md): uint8_t[count], 1 for rows of
+ * [first, first + count) that do. errors: ARGUMENT.
+ */
+ASCC_API ascc_status ascc_particles_get_asleep(const ascc_particles *particles, size_t first,
+                                               size_t count, uint8_t *asleep);
+
+/** Wakes all fluid. What changes rows or walls (add, remove, set, clear) wakes the fluid near them by itself. */
+ASCC_API ascc_status ascc_particles_wake(ascc_particles *particles);
+
 /** Bytes ascc_particles_snapshot needs. */
 ASCC_API size_t ascc_particles_snapshot_size(const ascc_particles *particles);
 
@@ -670,6 +680,9 @@ typedef struct ascc_step_options {
                               * gravity and the way of the fastest particle lie in the range that the
                               * model was trained for (ascc_model_info): 0 = as many as it takes, n = at
                               * most n, else RANGE; -1 = none, whatever the range */
+    /* Parts of the fluid that stay slower for half a second stop, until something wakes them (docs/sleeping.md);
+     * in speeds that gravity gives in a time step: 0.5 is a good one. 0 = none stops, and what had stopped wakes. */
+    double sleep_speed;
 } ascc_step_options;
 
 /**
@@ -719,7 +732,7 @@ typedef struct ascc_forces {
  *           model's largest radius from the origin; RANGE names the row of one that is farther.
  * cost      O(neighbour pairs). Scratch grows to the largest scene seen and is then reused.
  * promise   With an antisymmetric last layer: the integer momentum of the fluid changes by the
- *           external impulse and by what walls received, and by nothing else. Same input, same bits
+ *           external impulse and by what walls received (and the support of fluid that sleeps), and by nothing else. Same input, same bits
  *           out, for any thread_count, host task order, CPU, and order of the particles.
  * threads   one thread at a time per step and per particle set.
  */
@@ -764,6 +777,10 @@ typedef struct ascc_step_statistics {
     ascc_compression compression_before, compression_after;
     uint64_t sweeps;
     uint64_t substeps_total; /* of the run */
+    /* Fluid particles that slept in the last step, and what they had and received over the run, quanta: with them,
+     * before + external - wall - support = after. */
+    uint64_t asleep;
+    int64_t support_impulse[3];
 } ascc_step_statistics;
 
 ASCC_API ascc_status ascc_step_get_statistics(const ascc_step *step,
@@ -858,6 +875,7 @@ typedef struct ascc_ladder_statistics {
     uint64_t late;    /* steps that took longer than the budget */
     /* Of the last run, quanta of momentum, exact, as in ascc_step_statistics. */
     int64_t momentum_before[3], momentum_after[3], external_impulse[3], wall_impulse[3];
+    int64_t support_impulse[3];
 } ascc_ladder_statistics;
 
 ASCC_API ascc_status ascc_ladder_get_statistics(const ascc_ladder *ladder,

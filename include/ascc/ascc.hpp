@@ -567,6 +567,18 @@ class particles
         return got;
     }
 
+    /// 1 for each fluid particle that sleeps.
+    std::vector<std::uint8_t> asleep() const
+    {
+        std::vector<std::uint8_t> flags(count());
+        context_.check(ascc_particles_get_asleep(get(), 0, flags.size(), flags.data()));
+        return flags;
+    }
+    void wake()
+    {
+        check(ascc_particles_wake(get()));
+    }
+
     std::vector<unsigned char> snapshot() const
     {
         std::vector<unsigned char> bytes(ascc_particles_snapshot_size(get()));

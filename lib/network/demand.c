@@ -274,10 +274,14 @@ static ascc_status demand_output(ascc_network_run *run)
     const int32_t source = run->plan->output.term.source, set = ascc_network_set(network, source);
     const int32_t *key = network->term_key[run->plan->term_count];
     uint8_t *active = run->value[source].active;
-    for (size_t i = 0; i < h->fluid_count; i++)
-        active[set == ASCC_SET_FLUID ? i : h->whole[ASCC_SET_FLUID][i]] = 1;
-    if (run->plan->relaxation.guess)
-        memset(run->value[run->plan->relaxation.guess].active, 1, h->set[ASCC_SET_FLUID].count);
+    uint8_t *guessed =
+        run->plan->relaxation.guess ? run->value[run->plan->relaxation.guess].active : NULL;
+    for (size_t i = 0; i < h->fluid_count; i++) {
+        const bool wanted = !ascc_hierarchy_is_idle(h, i);
+        active[set == ASCC_SET_FLUID ? i : h->whole[ASCC_SET_FLUID][i]] = wanted;
+        if (guessed)
+            guessed[i] = wanted;
+    }
     if (key[0] < 0)
         return ASCC_OK;
     uint8_t *fluid = ascc_arena_lend(run->tools->arena, h->set[set].count, 1);
@@ -285,6 +289,9 @@ static ascc_status demand_output(ascc_network_run *run)
         return ascc_fail(run->tools->message, ASCC_ERROR_MEMORY, "no memory for the last layer");
     memcpy(fluid, active, h->set[set].count);
     ascc_status status = demand_rows(run, key[0], fluid, active);
+    /* Rows that sleep push the others with the pressure that they guess. */
+    for (size_t i = 0; guessed && h->idle && status == ASCC_OK && i < h->fluid_count; i++)
+        guessed[i] |= active[set == ASCC_SET_FLUID ? i : h->whole[ASCC_SET_FLUID][i]];
     for (int i = 1; i < ASCC_MAX_LISTS && status == ASCC_OK && key[i] >= 0; i++)
         status = ascc_rows_make(&run->rows[key[i]], run->tools, fluid);
     return status;
@@ -343,6 +350,24 @@ static ascc_status number_edges(ascc_network_run *run)
     return status;
 }
 
+/* A list of all fluid that somebody wants the impulses of. */
+static ascc_status make_relaxed(ascc_network_run *run, int32_t key)
+{
+    const ascc_hierarchy *h = run->hierarchy;
+    const size_t count = h->set[ASCC_SET_FLUID].count;
+    if (!h->idle)
+        return ascc_rows_make(&run->rows[key], run->tools, NULL);
+    const ascc_arena_mark mark = ascc_arena_mark_of(run->tools->arena);
+    uint8_t *wanted = ascc_arena_lend(run->tools->arena, count, 1);
+    for (size_t i = 0; wanted && i < count; i++)
+        wanted[i] = !h->idle[i];
+    const ascc_status status =
+        wanted ? ascc_rows_make(&run->rows[key], run->tools, wanted)
+               : ascc_fail(run->tools->message, ASCC_ERROR_MEMORY, "no memory for the relaxation");
+    ascc_arena_return(run->tools->arena, mark);
+    return status;
+}
+
 ascc_status ascc_network_demand(ascc_network_run *run, const ascc_network *network,
                                 ascc_hierarchy *hierarchy, const ascc_search_tools *tools,
                                 size_t *expected)
@@ -368,7 +393,7 @@ ascc_status ascc_network_demand(ascc_network_run *run, const ascc_network *netwo
     for (int32_t l = network->plan->layer_count - 1; status == ASCC_OK && l >= 0; l--)
         status = demand_layer(run, l);
     for (int i = 0; status == ASCC_OK && i < 2 && network->relaxation_key[i] >= 0; i++)
-        status = ascc_rows_make(&run->rows[network->relaxation_key[i]], tools, NULL);
+        status = make_relaxed(run, network->relaxation_key[i]);
     if (status == ASCC_OK && network->edge_key >= 0)
         status = number_edges(run);
     for (int32_t k = 0; status == ASCC_OK && k < network->key_count; k++) {

@@ -13,12 +13,13 @@ typedef struct ascc_hierarchy {
     ascc_points set[ASCC_MAX_SETS];
     size_t fluid_count; /* rows of the host's fluid */
     /* Rows of ASCC_SET_ALL, fluid and boundary in one order: */
-    uint32_t *origin;   /* the host's row: fluid row, or fluid_count + boundary row */
-    uint32_t *part;     /* the row in ASCC_SET_FLUID or ASCC_SET_BOUNDARY */
-    uint32_t *whole[2]; /* and back: [set row] of fluid, boundary */
-    int32_t *place[2];  /* low words of fluid, boundary once more: [set row][4], the last 0 */
-    ascc_extent extent; /* of all sets */
-    double base_radius; /* units: level 0 is in the order of cells for it */
+    uint32_t *origin;    /* the host's row: fluid row, or fluid_count + boundary row */
+    uint32_t *part;      /* the row in ASCC_SET_FLUID or ASCC_SET_BOUNDARY */
+    uint32_t *whole[2];  /* and back: [set row] of fluid, boundary */
+    int32_t *place[2];   /* low words of fluid, boundary once more: [set row][4], the last 0 */
+    const uint8_t *idle; /* rows of fluid whose impulses nobody wants; NULL = none */
+    ascc_extent extent;  /* of all sets */
+    double base_radius;  /* units: level 0 is in the order of cells for it */
     int grid_count;
     struct {
         int set;
@@ -48,6 +49,11 @@ static inline size_t ascc_hierarchy_host_row(const ascc_hierarchy *hierarchy, in
                                              size_t row)
 {
     return hierarchy->origin[set == ASCC_SET_ALL ? row : hierarchy->whole[set][row]];
+}
+
+static inline bool ascc_hierarchy_is_idle(const ascc_hierarchy *hierarchy, size_t fluid_row)
+{
+    return hierarchy->idle && hierarchy->idle[fluid_row];
 }
 
 /* Host's boundary row of a row of the boundary. */

@@ -23,6 +23,8 @@ static ascc_status impulses(const ascc_network_run *run, const ascc_impulse_scal
     const float *value = ascc_term_source(run, term);
     *pair_count = 0;
     for (size_t i = 0; i < h->fluid_count; i++) {
+        if (ascc_hierarchy_is_idle(h, i))
+            continue;
         const size_t from = set == ASCC_SET_FLUID ? i : h->whole[ASCC_SET_FLUID][i];
         const size_t row = ascc_hierarchy_host_row(h, set, from);
         for (size_t c = 0; c < d; c++) {

@@ -102,6 +102,11 @@ void ascc_pair_sum_add_walls(ascc_pair_sum *sum, size_t i, const ascc_pair_batch
 
 /* ---- Fluid pairs, chunk by chunk ---- */
 
+static bool is_idle(const ascc_pair_sum *sum, size_t i)
+{
+    return sum->idle && sum->idle[i];
+}
+
 static bool coincident(const ascc_rows *rows, size_t i, uint32_t j)
 {
     return rows->source->low[0][j] == rows->query->low[0][i] &&
@@ -128,6 +133,12 @@ static size_t first_apart(const ascc_pair_sum *sum, size_t i)
     return j;
 }
 
+/* Whether a pair belongs to row i though j comes first: an idle row has no turn of its own. */
+static bool stands_in(const ascc_pair_sum *sum, size_t i, uint32_t j)
+{
+    return j < i && is_idle(sum, j) && !(sum->skip_coincident && coincident(sum->rows, i, j));
+}
+
 /* A pair of fluid particles belongs to the first of its rows; at one place they have no direction. */
 static size_t evaluate_row(ascc_pair_sum *sum, size_t i)
 {
@@ -142,7 +153,7 @@ static size_t evaluate_row(ascc_pair_sum *sum, size_t i)
         for (; k < stop; k++) {
             const uint32_t j = neighbor[k];
             batch.neighbor[batch.count] = j;
-            batch.count += j >= first;
+            batch.count += j >= first || (sum->idle && stands_in(sum, i, j));
         }
         if (batch.count == ASCC_PAIR_BATCH || (k == count && batch.count))
             pairs += flush(sum, i, &batch);
@@ -160,7 +171,8 @@ static size_t evaluate_mixed_row(ascc_pair_sum *sum, size_t i)
     batch.count = 0;
     for (size_t k = 0; k < rows->count[i]; k++) {
         const uint32_t j = neighbor[k];
-        if ((j <= i && sum->fluid[j]) || (sum->skip_coincident && coincident(rows, i, j)))
+        if ((j <= i && sum->fluid[j] && !is_idle(sum, j)) ||
+            (sum->skip_coincident && coincident(rows, i, j)))
             continue;
         batch.neighbor[batch.count] = j;
         if (++batch.count == ASCC_PAIR_BATCH)
@@ -178,7 +190,7 @@ static void evaluate_chunks(void *data, size_t begin, size_t end, int32_t slot)
         const size_t first = (c * 3 + sum->phase) * sum->chunk;
         size_t pairs = 0;
         for (size_t i = first; i < ascc_min_size(first + sum->chunk, count); i++) {
-            if (sum->whole && sum->whole(sum, i))
+            if (is_idle(sum, i) || (sum->whole && sum->whole(sum, i)))
                 continue;
             if (sum->set == ASCC_SET_FLUID)
                 pairs += evaluate_row(sum, i);
@@ -199,7 +211,7 @@ static void measure_rows(void *data, size_t begin, size_t end, int32_t slot)
     const bool ascending = rows->source_grid->order == NULL;
     size_t reach = 1;
     for (size_t i = begin; i < end; i++) {
-        if (!sum->fluid[i])
+        if (!sum->fluid[i] || is_idle(sum, i))
             continue;
         const uint32_t *neighbor = rows->neighbor + rows->start[i];
         const size_t count = rows->count[i], stride = ascending && count > 1 ? count - 1 : 1;
@@ -249,6 +261,8 @@ static void evaluate_walls(void *data, size_t begin, size_t end, int32_t slot)
     size_t pairs = 0;
     batch.count = 0;
     for (size_t i = begin; i < end; i++) {
+        if (is_idle(sum, i))
+            continue;
         const uint32_t *neighbor = rows->neighbor + rows->start[i];
         for (size_t k = 0; k < rows->count[i]; k++) {
             batch.neighbor[batch.count] = neighbor[k];
@@ -280,19 +294,23 @@ ascc_status ascc_pair_sum_open(ascc_pair_sum *sum, const ascc_network_run *run, 
     const size_t count = h->set[set].count;
     uint8_t *fluid = ascc_arena_lend(arena, count, 1);
     double *mass = ascc_arena_lend(arena, count, sizeof *mass);
+    uint8_t *idle = h->idle ? ascc_arena_lend(arena, count, 1) : NULL;
     int64_t *sums = ascc_arena_lend(arena, count, stride * sizeof *sums);
-    if (!fluid || !mass || !sums)
+    if (!fluid || !mass || !sums || (h->idle && !idle))
         return ascc_fail(run->tools->message, ASCC_ERROR_MEMORY, "no memory for the impulses");
     memset(sums, 0, count * stride * sizeof *sums);
     for (size_t i = 0; i < count; i++) {
         const size_t row = ascc_hierarchy_host_row(h, set, i);
         fluid[i] = row < h->fluid_count;
         mass[i] = fluid[i] ? fluid_mass[row] : 0.0;
+        if (idle)
+            idle[i] = fluid[i] && h->idle[set == ASCC_SET_ALL ? h->part[i] : i];
     }
     *sum = (ascc_pair_sum){.run = run,
                            .set = set,
                            .fluid = fluid,
                            .mass = mass,
+                           .idle = idle,
                            .uniform = true,
                            .sum = sums,
                            .stride = stride,

@@ -50,6 +50,7 @@ typedef struct ascc_pair_sum {
     int32_t set;          /* whose pairs: fluid, or fluid and walls together */
     const uint8_t *fluid; /* [set rows] 1 = a fluid particle */
     const double *mass;   /* [set rows] kg, 0 for walls */
+    const uint8_t *idle;  /* [set rows] 1 = its pairs are not wanted; NULL = all are */
     bool uniform;         /* all fluid particles have one mass */
     int64_t *sum;         /* [set rows][stride] */
     size_t stride;

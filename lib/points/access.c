@@ -7,6 +7,7 @@
 #include <string.h>
 
 #include "bodies.h"
+#include "rest.h"
 
 /* ---- Rows of the host's numbers -------------------------------------------------------------- */
 
@@ -116,8 +117,15 @@ ascc_status ascc_particles_set(ascc_particles *particles, ascc_kind kind, ascc_f
             &message);
     if (status == ASCC_OK && kind == ASCC_BOUNDARY)
         status = ascc_bodies_check_free(particles, first, count, &message);
-    if (status == ASCC_OK && count > 0)
+    if (status == ASCC_OK && count > 0) {
+        /* Where rows were, and where they are: a velocity of walls wakes as it moves them. */
+        const bool wakes = which != ASCC_FIELD_wall_velocity;
+        if (wakes)
+            ascc_rest_disturb(particles, kind, first, count);
         status = set_field(particles, which, first, count, &from, &message);
+        if (wakes)
+            ascc_rest_disturb(particles, kind, first, count);
+    }
     return status == ASCC_OK ? status : ascc_particles_fail(particles, status, "%s", message.text);
 }
 

@@ -3,6 +3,7 @@
 
 #include <string.h>
 
+#include "rest.h"
 #include "rotation.h"
 #include "shapes.h"
 
@@ -315,6 +316,7 @@ static ascc_status add_sampled(ascc_particles *particles, const ascc_surface *su
     particles->bodies[particles->body_count++] = *body;
     ascc_body_place(particles, body, particles->wall_position, particles->wall_normal,
                     particles->wall_velocity);
+    ascc_rest_disturb(particles, ASCC_BOUNDARY, first, count);
     return ASCC_OK;
 }
 
@@ -390,9 +392,17 @@ static ascc_status move_body(ascc_particles *particles, int32_t number, const as
     settle_torque(particles, body);
     memcpy(moved.torque, body->torque, sizeof moved.torque);
     moved.moved = 1;
+    /* A pose that is not where it was; velocities wake fluid as they move the points. */
+    const bool jumps = memcmp(moved.position, body->position, sizeof moved.position) != 0 ||
+                       memcmp(moved.rotation, body->rotation, sizeof moved.rotation) != 0 ||
+                       moved.angle != body->angle;
+    if (jumps)
+        ascc_rest_disturb(particles, ASCC_BOUNDARY, first, count);
     *body = moved;
     ascc_body_place(particles, body, particles->wall_position, particles->wall_normal,
                     particles->wall_velocity);
+    if (jumps)
+        ascc_rest_disturb(particles, ASCC_BOUNDARY, first, count);
     return ASCC_OK;
 }
 
@@ -426,6 +436,7 @@ static ascc_status remove_body(ascc_particles *particles, int32_t number, ascc_m
         memset(marked, 0, rows);
         memset(marked + first, 1, count);
     }
+    ascc_rest_disturb(particles, ASCC_BOUNDARY, first, count);
     ascc_particles_drop_rows(particles, ASCC_BOUNDARY, marked);
     ascc_release(allocator, marked, rows, 1);
     const size_t index = (size_t)(body - particles->bodies);
@@ -436,6 +447,7 @@ static ascc_status remove_body(ascc_particles *particles, int32_t number, ascc_m
 
 ascc_status ascc_body_remove(ascc_particles *particles, int32_t body)
 {
+    ASCC_FLOAT_SCOPE;
     if (!ascc_particles_is_set(particles))
         return ASCC_ERROR_ARGUMENT;
     ascc_message message;

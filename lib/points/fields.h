@@ -34,10 +34,11 @@
     X(ASCC_BOUNDARY, wall_velocity, double, VECTOR, NONZERO, ASCC_VELOCITY, check_velocity)        \
     /* In the frame of a body (bodies.h); zeros where there is none. */                            \
     X(ASCC_BOUNDARY, wall_own_position, double, VECTOR, UNHASHED, PRIVATE, check_position)         \
-    X(ASCC_BOUNDARY, wall_own_normal, double, VECTOR, UNHASHED, PRIVATE, check_own_normal)
+    X(ASCC_BOUNDARY, wall_own_normal, double, VECTOR, UNHASHED, PRIVATE, check_own_normal)         \
+    X(ASCC_FLUID, rest, int32_t, SCALAR, NONZERO, PRIVATE, NULL) /* rest.h */
 
 /* Raise it with every change of the list. */
-#define ASCC_SNAPSHOT_VERSION 3
+#define ASCC_SNAPSHOT_VERSION 4
 
 /* Where a field stands in the list: ASCC_FIELD_position and so on. */
 typedef enum ascc_field_index {
@@ -51,6 +52,7 @@ typedef enum ascc_field_index {
 static inline size_t ascc_snapshot_fields(uint64_t version)
 {
     return version == ASCC_SNAPSHOT_VERSION ? ASCC_FIELD_COUNT
+           : version == 3                   ? ASCC_FIELD_rest
            : version == 2                   ? ASCC_FIELD_wall_own_position
            : version == 1                   ? ASCC_FIELD_wall_velocity
                                             : 0;

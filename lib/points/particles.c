@@ -3,6 +3,7 @@
 #include "particles.h"
 
 #include "bodies.h"
+#include "rest.h"
 
 #include <stdio.h>
 #include <string.h>
@@ -271,6 +272,7 @@ static ascc_status add_fluid(ascc_particles *particles, size_t count,
     ascc_velocity_store(particles, &from.velocity, first, count);
     give_ids(particles, particles->id, first, count, ids);
     particles->fluid_count += count;
+    ascc_rest_disturb(particles, ASCC_FLUID, first, count);
     return ASCC_OK;
 }
 
@@ -339,6 +341,7 @@ static ascc_status add_boundary(ascc_particles *particles, size_t count,
         return status;
     ascc_field_store(particles, ASCC_FIELD_wall_position, &positions, first, count);
     ascc_field_store(particles, ASCC_FIELD_wall_normal, &normals, first, count);
+    ascc_rest_disturb(particles, ASCC_BOUNDARY, first, count);
     if (ids != NULL)
         memcpy(ids, particles->wall_id + first, count * sizeof *ids);
     return ASCC_OK;
@@ -370,6 +373,7 @@ static ascc_status add_resting(ascc_particles *particles, size_t count, ascc_mes
     ascc_field_store(particles, ASCC_FIELD_mass, &mass, first, added);
     give_ids(particles, particles->id, first, added, NULL);
     particles->fluid_count = count;
+    ascc_rest_disturb(particles, ASCC_FLUID, first, added);
     return ASCC_OK;
 }
 
@@ -379,6 +383,7 @@ ascc_status ascc_particles_resize_fluid(ascc_particles *particles, size_t count)
     if (!ascc_particles_is_set(particles))
         return ASCC_ERROR_ARGUMENT;
     if (count <= particles->fluid_count) {
+        ascc_rest_disturb(particles, ASCC_FLUID, count, particles->fluid_count - count);
         particles->fluid_count = count;
         return ASCC_OK;
     }
@@ -410,8 +415,29 @@ static ascc_status mark_rows(const ascc_particles *particles, size_t count, cons
     return ASCC_OK;
 }
 
+/* Runs of rows around which fluid wakes one by one; where more go, all of it wakes. */
+#define MOST_RUNS 64
+
+static void disturb_marked(ascc_particles *particles, ascc_kind kind, const unsigned char *marked)
+{
+    const size_t count = ascc_particles_count(particles, kind);
+    size_t runs = 0;
+    for (size_t i = 0, end; i < count; i = end) {
+        for (end = i + 1; end < count && marked[end] == marked[i];)
+            end++;
+        if (!marked[i])
+            continue;
+        if (++runs > MOST_RUNS) {
+            ascc_rest_end(particles);
+            return;
+        }
+        ascc_rest_disturb(particles, kind, i, end - i);
+    }
+}
+
 ascc_status ascc_particles_remove(ascc_particles *particles, size_t count, const uint64_t *ids)
 {
+    ASCC_FLOAT_SCOPE;
     if (!ascc_particles_is_set(particles))
         return ASCC_ERROR_ARGUMENT;
     if (count == 0)
@@ -430,6 +456,8 @@ ascc_status ascc_particles_remove(ascc_particles *particles, size_t count, const
     const ascc_status status = mark_rows(particles, count, ids, marked, &message);
     if (status == ASCC_OK) {
         const size_t fluid = particles->fluid_count; /* before it shrinks */
+        disturb_marked(particles, ASCC_FLUID, marked);
+        disturb_marked(particles, ASCC_BOUNDARY, marked + fluid);
         ascc_particles_drop_rows(particles, ASCC_FLUID, marked);
         ascc_particles_drop_rows(particles, ASCC_BOUNDARY, marked + fluid);
     }
@@ -443,9 +471,10 @@ ascc_status ascc_particles_clear(ascc_particles *particles, ascc_kind kind)
         return ASCC_ERROR_ARGUMENT;
     if (kind == ASCC_FLUID)
         particles->fluid_count = 0;
-    else if (kind == ASCC_BOUNDARY)
+    else if (kind == ASCC_BOUNDARY) {
+        ascc_rest_end(particles);
         particles->boundary_count = particles->body_count = 0;
-    else
+    } else
         return ascc_particles_fail(particles, ASCC_ERROR_ARGUMENT,
                                    "kind: %d is neither fluid nor boundary", (int)kind);
     return ASCC_OK;

@@ -209,7 +209,7 @@ static bool open_snapshot(const unsigned char *bytes, size_t size, snapshot *fro
     const unsigned char *const end = bytes + size - 8;
     size_t words = size / 8 - SNAPSHOT_FRAME;
     uint64_t bodies = 0, next_body = 0;
-    if (fields == ASCC_FIELD_COUNT) {
+    if (fields > ASCC_FIELD_wall_own_position) {
         if (words < BODIES_FRAME)
             return false;
         words -= BODIES_FRAME;
@@ -367,7 +367,7 @@ static ascc_status check_points_of_bodies(const snapshot *from, ascc_message *me
 {
     const size_t d = (size_t)from->dimension;
     size_t next = 0;
-    if (from->fields < ASCC_FIELD_COUNT)
+    if (from->fields <= ASCC_FIELD_wall_own_position)
         return ASCC_OK;
     for (size_t row = 0; row < from->rows[ASCC_BOUNDARY]; row++) {
         const uint64_t number = get_word(from->words[ASCC_FIELD_wall_body] + 8 * row);

@@ -4,7 +4,7 @@
  * The fields of a kind lie in one block of memory, so growing them is one allocation that succeeds
  * or fails as a whole:
  *
- *     fluid     | position | momentum | mass | id |
+ *     fluid     | position | momentum | mass | id | rest |
  *     boundary  | position | normal   | impulse | id | body | velocity | own position | own normal |
  */
 #include <string.h>

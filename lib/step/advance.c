@@ -9,7 +9,8 @@ typedef struct advance_job {
     const ascc_particles *p;
     const ascc_motion *motion;
     const int64_t *impulse;
-    bool further; /* from momenta that the step has reached, not from those before it */
+    bool further;        /* from momenta that the step has reached, not from those before it */
+    const uint8_t *idle; /* NULL = none */
     ascc_advance *advance;
     atomic_size_t bad; /* 1 + first row that fails */
 } advance_job;
@@ -53,13 +54,27 @@ static ascc_status advance_row(const advance_job *job, size_t i, ascc_message *m
     return ASCC_OK;
 }
 
+/* Fluid that nothing moves: it keeps what it is given apart, for its support. */
+static void stay(const advance_job *job, size_t i)
+{
+    const size_t d = (size_t)job->p->dimension;
+    for (size_t k = i * d; k < (i + 1) * d; k++) {
+        const uint64_t given =
+            job->further ? (uint64_t)job->advance->momentum[k] + (uint64_t)job->impulse[k] : 0;
+        job->advance->momentum[k] = (int64_t)given;
+        job->advance->position[k] = job->p->position[k];
+    }
+}
+
 static void advance_rows(void *data, size_t begin, size_t end, int32_t slot)
 {
     (void)slot;
     advance_job *job = data;
     ascc_message message;
     for (size_t i = begin; i < end; i++)
-        if (advance_row(job, i, &message) != ASCC_OK) {
+        if (job->idle && job->idle[i]) {
+            stay(job, i);
+        } else if (advance_row(job, i, &message) != ASCC_OK) {
             ascc_note_first(&job->bad, i);
             return;
         }
@@ -71,6 +86,7 @@ static ascc_status advance_all(ascc_step_state *state, const int64_t *impulse, b
                        .motion = state->motion,
                        .impulse = impulse,
                        .further = further,
+                       .idle = state->sleep.idle,
                        .advance = &state->advance};
     ascc_workers_run(state->tools.workers, job.p->fluid_count, 1024, advance_rows, &job);
     const size_t bad = atomic_load(&job.bad); /* says once more why */

@@ -111,11 +111,17 @@ ascc_status ascc_stage_commit(ascc_step_state *state, ascc_particles *p, bool fi
     add_totals(workers, s->external_impulse, state->advance.external, n, d);
     add_totals(workers, s->wall_impulse, state->impulses.wall, walls, d);
     ascc_totals(workers, s->momentum_after, state->advance.momentum, n, d);
+    s->asleep = state->sleep.count;
+    for (size_t c = 0; c < 3; c++)
+        s->support_impulse[c] =
+            (int64_t)((uint64_t)s->support_impulse[c] + (uint64_t)state->sleep.support[c]);
     const ascc_status status = first ? ASCC_OK : sum_walls(state);
     if (status != ASCC_OK)
         return status;
     commit_job job = {p, &state->advance};
     ascc_workers_run(workers, n, 8192, commit_rows, &job);
+    if (state->sleep.rest)
+        memcpy(p->rest, state->sleep.rest, n * sizeof *p->rest);
     add_torques(p, state->impulses.wall, first);
     if (state->advance.walls_move)
         memcpy(p->wall_position, state->advance.wall, walls * d * sizeof(double));

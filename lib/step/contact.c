@@ -137,7 +137,8 @@ static void hold_rows(void *data, size_t begin, size_t end, int32_t slot)
     (void)slot;
     contact_job *job = data;
     for (size_t i = begin; i < end; i++)
-        if (job->rows->count[i] && !hold_row(job, i)) {
+        if (!ascc_hierarchy_is_idle(job->run->hierarchy, i) && job->rows->count[i] &&
+            !hold_row(job, i)) {
             ascc_note_first(&job->bad, i);
             return;
         }

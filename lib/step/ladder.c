@@ -185,6 +185,8 @@ static void add_run(ascc_ladder_statistics *to, const ascc_step_statistics *from
             (int64_t)((uint64_t)to->external_impulse[c] + (uint64_t)from->external_impulse[c]);
         to->wall_impulse[c] =
             (int64_t)((uint64_t)to->wall_impulse[c] + (uint64_t)from->wall_impulse[c]);
+        to->support_impulse[c] =
+            (int64_t)((uint64_t)to->support_impulse[c] + (uint64_t)from->support_impulse[c]);
     }
     to->steps++;
 }
@@ -283,6 +285,7 @@ static ascc_status run(ascc_ladder *ladder, ascc_particles *p, const ascc_forces
     s->steps = 0;
     memset(s->external_impulse, 0, sizeof s->external_impulse);
     memset(s->wall_impulse, 0, sizeof s->wall_impulse);
+    memset(s->support_impulse, 0, sizeof s->support_impulse);
     ascc_status status = check(ladder, p);
     if (status == ASCC_OK && count < 0)
         status = ascc_ladder_fail(ladder, ASCC_ERROR_ARGUMENT, "count = %d is negative", count);

@@ -39,10 +39,11 @@ typedef struct relaxation {
     float *own[3];                                       /* sum of g, walls included */
     float *push[3];                                      /* the same by weight */
     float *excess, *response, *pressure, *change, *move; /* move: rows of 4 */
-    uint8_t *near;       /* rows with neighbours within the repulsion */
-    const float *guess;  /* [count][padded] of pressures, times D_lattice; NULL = 0 */
-    const double *place; /* [count][3] before the step, if corrections lie along those lines */
-    float *scratch;      /* [slots][4][room] */
+    uint8_t *near;          /* rows with neighbours within the repulsion */
+    const float *guess;     /* [count][padded] of pressures, times D_lattice; NULL = 0 */
+    const uint8_t *guessed; /* rows that have one */
+    const double *place;    /* [count][3] before the step, if corrections lie along those lines */
+    float *scratch;         /* [slots][4][room] */
     size_t room;
     float omega;     /* of the sweep under way */
     bool slows;      /* sweeps are on velocities, not densities */
@@ -77,6 +78,11 @@ static size_t whole_vectors(size_t count)
     return (count + 7) / 8 * 8;
 }
 
+static bool is_idle(const relaxation *r, size_t i)
+{
+    return ascc_hierarchy_is_idle(&r->state->hierarchy, i);
+}
+
 /* Where the pairs of each row may begin, with room for all that its list has; rows of a block then follow one
  * another without gaps. */
 static size_t place_rows(relaxation *r)
@@ -84,7 +90,7 @@ static size_t place_rows(relaxation *r)
     size_t at = 0;
     for (size_t i = 0; i < r->count; i++) {
         r->start[i] = at;
-        at += whole_vectors(r->rows->count[i]);
+        at += is_idle(r, i) ? 0 : whole_vectors(r->rows->count[i]);
     }
     return at;
 }
@@ -150,8 +156,9 @@ static void find_velocity(relaxation *r, size_t i)
         r->state->motion->time_step * p->quantum * r->state->length_unit / r->constants->support;
     for (size_t c = 0; c < 4; c++)
         r->move[i * 4 + c] =
-            c < d ? (float)((double)r->state->advance.momentum[row * d + c] * unit / p->mass[row])
-                  : 0.0f;
+            c < d && !is_idle(r, i)
+                ? (float)((double)r->state->advance.momentum[row * d + c] * unit / p->mass[row])
+                : 0.0f;
 }
 
 static void find_places(void *data, size_t begin, size_t end, int32_t slot)
@@ -254,6 +261,16 @@ static void find_divergence(relaxation *r, size_t begin, size_t end)
     r->state->tools.kernels->divergence(&pairs, begin, end, r->own, r->move, r->excess);
 }
 
+/* A row without pairs, which stays as it is. */
+static void leave_out(relaxation *r, size_t i)
+{
+    r->end[i] = r->start[i];
+    r->near[i] = 0;
+    r->excess[i] = r->response[i] = 0.0f;
+    for (int c = 0; c < 3; c++)
+        r->own[c][i] = r->push[c][i] = 0.0f;
+}
+
 static void look_around(void *data, size_t begin, size_t end, int32_t slot)
 {
     relaxation *r = data;
@@ -263,6 +280,10 @@ static void look_around(void *data, size_t begin, size_t end, int32_t slot)
         float sum[8], wall[8] = {0};
         if (i > begin)
             r->start[i] = r->end[i - 1];
+        if (is_idle(r, i)) {
+            leave_out(r, i);
+            continue;
+        }
         look(r, i, scratch, sum);
         if (r->wall_rows->count[i])
             look_at_walls(r, i, scratch, wall);
@@ -339,6 +360,9 @@ static void push_rows(void *data, size_t begin, size_t end, int32_t slot)
     relaxation *r = data;
     const ascc_gradients pairs = gradients(r);
     r->state->tools.kernels->push(&pairs, begin, end, r->pressure, r->push, r->move);
+    for (size_t i = begin; r->state->hierarchy.idle && i < end; i++)
+        for (size_t c = 0; is_idle(r, i) && c < 4; c++)
+            r->move[i * 4 + c] = 0.0f;
 }
 
 static void relax_rows(void *data, size_t begin, size_t end, int32_t slot)
@@ -360,7 +384,7 @@ static void guess_rows(void *data, size_t begin, size_t end, int32_t slot)
     relaxation *r = data;
     const float unit = (float)(ascc_step_share(r->state) / r->constants->lattice_response);
     for (size_t i = begin; i < end; i++)
-        r->pressure[i] = unit * r->guess[i * ascc_padded(1)];
+        r->pressure[i] = r->guessed[i] ? unit * r->guess[i * ascc_padded(1)] : 0.0f;
 }
 
 /* The first sweep of all without a guess: nothing has moved yet. */
@@ -469,11 +493,20 @@ static double impulse_factor(const relaxation *r)
            state->particles->quantum;
 }
 
+/* Is one of the pairs with a row that has no turn of its own? */
+static bool touches_idle(const relaxation *r, size_t i)
+{
+    bool touches = false;
+    for (size_t k = r->start[i]; r->state->hierarchy.idle && k < r->end[i]; k++)
+        touches |= is_idle(r, r->neighbor[k]);
+    return touches;
+}
+
 /* Of a row without repulsion what was kept is all. */
 static bool evaluate_kept(ascc_pair_sum *sum, size_t i)
 {
     const relaxation *r = sum->data;
-    if (r->near[i])
+    if (r->near[i] || touches_idle(r, i))
         return false;
     const ascc_gradients pairs = gradients(r);
     const ascc_pressures pressures = {.pressure = r->pressure,
@@ -648,8 +681,10 @@ static ascc_status relax(ascc_step_state *state, relaxation *r, int64_t *given,
         status = no_memory(state);
     if (status != ASCC_OK)
         return status;
-    if (r->constants->guess && first)
+    if (r->constants->guess && first) {
         r->guess = state->run.value[r->constants->guess].rectified;
+        r->guessed = state->run.value[r->constants->guess].active;
+    }
     memset(r->change, 0, r->count * sizeof *r->change);
     measure(r, found);
     if (first)

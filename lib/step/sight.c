@@ -98,6 +98,22 @@ static double *scaled(const ascc_search_tools *tools, const double *position, si
     return job.to;
 }
 
+/* Rows that sleep among others that do, in the order of the set. */
+static ascc_status take_idle(ascc_step_state *state)
+{
+    ascc_hierarchy *h = &state->hierarchy;
+    const size_t count = h->set[ASCC_SET_FLUID].count;
+    if (!state->sleep.idle)
+        return ASCC_OK;
+    uint8_t *idle = ascc_arena_take(state->tools.arena, count, 1);
+    if (!idle)
+        return ascc_fail(state->tools.message, ASCC_ERROR_MEMORY, "no memory for %zu rows", count);
+    for (size_t i = 0; i < count; i++)
+        idle[i] = state->sleep.idle[ascc_hierarchy_host_row(h, ASCC_SET_FLUID, i)];
+    h->idle = idle;
+    return ASCC_OK;
+}
+
 ascc_status ascc_stage_sight(ascc_step_state *state)
 {
     const ascc_search_tools *tools = &state->tools;
@@ -120,5 +136,5 @@ ascc_status ascc_stage_sight(ascc_step_state *state)
         return ascc_fail(tools->message, ASCC_ERROR_MEMORY, "no memory for the features");
     status = ascc_hierarchy_build(&state->hierarchy, tools, state->network->plan, &scene);
     ascc_arena_return(tools->arena, before_scene);
-    return status;
+    return status == ASCC_OK ? take_idle(state) : status;
 }

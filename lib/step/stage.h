@@ -18,6 +18,7 @@ typedef struct ascc_motion {
     const double *acceleration; /* [fluid][dimension] or NULL */
     ascc_advection advection;
     double max_displacement; /* 0 = none */
+    double sleep_speed;      /* in what gravity gives in a step; 0 = nothing sleeps */
 } ascc_motion;
 
 /* One step's state while it is not yet the particles' own. All [fluid count][dimension]. */
@@ -31,6 +32,16 @@ typedef struct ascc_advance {
     const double *wall;
     bool walls_move;
 } ascc_advance;
+
+/* Fluid that sleeps, all in the host's order. */
+typedef struct ascc_sleep {
+    size_t count;         /* rows */
+    const uint8_t *still; /* 1 = sleeps: stays where it is; NULL = none */
+    const uint8_t *idle;  /* 1 = and so do all that could push it: nothing is computed for it */
+    int32_t *rest;        /* what the particles' own become; NULL = they stay as they are */
+    struct ascc_sleep_blocks *blocks; /* sleep.c's own */
+    int64_t support[3];               /* what sleeping rows had and received, quanta */
+} ascc_sleep;
 
 /* At a free surface, where density lacks more than this, a divergence means nothing. */
 #define ASCC_SURFACE 0.35f
@@ -62,6 +73,7 @@ typedef struct ascc_step_state {
     ascc_step_statistics *statistics; /* also the times of stages */
     double since;                     /* when the stage under way began, s */
     /* What stages make: */
+    ascc_sleep sleep;
     ascc_advance advance;
     ascc_impulses impulses;
     float *fluid_features, *boundary_features; /* lent until the network has run */
@@ -86,6 +98,10 @@ typedef ascc_status (*ascc_stage)(ascc_step_state *state);
 ascc_status ascc_stage_forces(ascc_step_state *state);
 /* Where walls end, if any moves. errors: MEMORY, RANGE; the message names the row. */
 ascc_status ascc_stage_wall_motion(ascc_step_state *state);
+/* Which fluid sleeps (docs/sleeping.md); no time of its own where none may. errors: MEMORY. */
+ascc_status ascc_stage_sleep(ascc_step_state *state);
+/* Takes what sleeping rows have received. */
+ascc_status ascc_stage_support(ascc_step_state *state);
 /* Features, and the point sets of the scene (paper sections 3.3, 3.4). errors: MEMORY, RANGE. */
 ascc_status ascc_stage_sight(ascc_step_state *state);
 /* New momenta and positions. errors: RANGE, NOT_FINITE; the message names the particle. */

@@ -14,7 +14,7 @@
 #define DEFAULT_MAX_NEIGHBORS 4096
 #define DEFAULT_DISPLACEMENT 64.0 /* spacings a step */
 
-_Static_assert(sizeof(void *) != 8 || sizeof(ascc_step_options) == 40, "released layout");
+_Static_assert(sizeof(void *) != 8 || sizeof(ascc_step_options) == 48, "released layout");
 _Static_assert(sizeof(void *) != 8 || sizeof(ascc_forces) == 24, "released layout");
 _Static_assert(sizeof(void *) != 8 || sizeof(ascc_stage_time) == 16, "released layout");
 
@@ -24,16 +24,18 @@ static ascc_status read_options(const ascc_step_options *given, ascc_step_option
                                 ascc_message *message)
 {
     *o = (ascc_step_options){0};
-    if (given && !ascc_read_struct(o, sizeof *o, given, sizeof *o))
+    if (given && !ascc_read_struct(o, sizeof *o, given, offsetof(ascc_step_options, sleep_speed)))
         return ascc_fail(message, ASCC_ERROR_ARGUMENT, "ascc_step_options.size is not understood");
     if (!(o->time_step >= 0.0 && isfinite(o->time_step)) ||
         !(o->length_unit >= 0.0 && isfinite(o->length_unit)) || !(o->max_displacement >= 0.0) ||
-        o->max_neighbors < 0 || o->max_neighbors > 1 << 20 || o->substeps < -1)
+        !(o->sleep_speed >= 0.0 && isfinite(o->sleep_speed)) || o->max_neighbors < 0 ||
+        o->max_neighbors > 1 << 20 || o->substeps < -1)
         return ascc_fail(message, ASCC_ERROR_ARGUMENT,
                          "step options: time_step %g, length_unit %g, max_displacement %g, "
-                         "max_neighbors %d: each must be finite and >= 0; substeps %d: at least -1",
+                         "max_neighbors %d, sleep_speed %g: each must be finite and >= 0; substeps "
+                         "%d: at least -1",
                          o->time_step, o->length_unit, o->max_displacement, o->max_neighbors,
-                         o->substeps);
+                         o->sleep_speed, o->substeps);
     return ASCC_OK;
 }
 
@@ -47,6 +49,7 @@ static ascc_status fill_step(ascc_step *step, const ascc_step_options *o, ascc_m
     step->model_length = step->length_unit;
     step->model_time = 1.0;
     step->max_displacement = o->max_displacement;
+    step->sleep_speed = o->sleep_speed;
     step->engine = ascc_engine_cpu;
     const ascc_status status =
         ascc_network_create(&step->network, &context->allocator, &model->plan, &model->packed,
@@ -186,15 +189,19 @@ static ascc_status run_engine(ascc_step_state *state)
 static const struct {
     const char *name; /* NULL: it names its own */
     ascc_stage run;
+    bool moves; /* only where some fluid is awake */
 } stages[] = {
-    {"forces", ascc_stage_wall_motion},
-    {"forces", ascc_stage_forces},
-    {NULL, run_engine},
-    {"advance", ascc_stage_advance},
-    {NULL, ascc_stage_relaxation},
-    {"contact", ascc_stage_contact},
-    {NULL, ascc_stage_divergence},
+    {"forces", ascc_stage_wall_motion, false}, {NULL, ascc_stage_sleep, false},
+    {"forces", ascc_stage_forces, false},      {NULL, run_engine, true},
+    {"advance", ascc_stage_advance, false},    {NULL, ascc_stage_relaxation, true},
+    {"contact", ascc_stage_contact, true},     {NULL, ascc_stage_divergence, true},
+    {NULL, ascc_stage_support, false},
 };
+
+static bool all_sleeps(const ascc_step_state *state)
+{
+    return state->sleep.count > 0 && state->sleep.count == state->particles->fluid_count;
+}
 
 ascc_status ascc_step_once(ascc_step *step, ascc_particles *p, const ascc_motion *motion,
                            bool first, ascc_arena *arena, ascc_step_state *state)
@@ -215,6 +222,8 @@ ascc_status ascc_step_once(ascc_step *step, ascc_particles *p, const ascc_motion
     const double begin = state->since;
     ascc_status status = ASCC_OK;
     for (size_t i = 0; i < sizeof stages / sizeof *stages && status == ASCC_OK; i++) {
+        if (stages[i].moves && all_sleeps(state))
+            continue;
         status = stages[i].run(state);
         if (stages[i].name)
             ascc_stage_lap(state, stages[i].name);
@@ -285,7 +294,7 @@ typedef struct kept_field {
     size_t size;
 } kept_field;
 
-#define KEPT_FIELDS 7
+#define KEPT_FIELDS 8
 
 static size_t find_kept(const ascc_particles *p, kept_field field[KEPT_FIELDS])
 {
@@ -298,7 +307,8 @@ static size_t find_kept(const ascc_particles *p, kept_field field[KEPT_FIELDS])
     field[4] = (kept_field){p->wall_normal, w};
     field[5] = (kept_field){p->wall_velocity, w};
     field[6] = (kept_field){p->bodies, p->body_count * sizeof *p->bodies};
-    return 2 * n + 4 * w + field[6].size;
+    field[7] = (kept_field){p->rest, p->fluid_count * sizeof *p->rest};
+    return 2 * n + 4 * w + field[6].size + field[7].size;
 }
 
 static bool keep(ascc_step *step, const ascc_particles *p)
@@ -365,7 +375,8 @@ ascc_status ascc_step_run(ascc_step *step, ascc_particles *particles, const ascc
     if (!step || step->magic != ASCC_STEP_MAGIC)
         return ASCC_ERROR_ARGUMENT;
     step->statistics = (ascc_step_statistics){.level_count = step->model->plan.level_count};
-    ascc_motion motion = {.advection = step->model->plan.advection};
+    ascc_motion motion = {.advection = step->model->plan.advection,
+                          .sleep_speed = step->sleep_speed};
     ascc_status status = check_particles(step, particles);
     if (status == ASCC_OK) {
         ascc_find_units(step, particles);

@@ -12,7 +12,8 @@ struct ascc_step {
     ascc_model *model;                    /* retained */
     double time_step;                     /* the host's, s */
     double length_unit, max_displacement; /* m; the host's, 0 = by spacings */
-    double model_length, model_time;      /* the model's m and s in the host's unit and second */
+    double sleep_speed;
+    double model_length, model_time; /* the model's m and s in the host's unit and second */
     ascc_network network;
     size_t *expected; /* [key_count of the network] neighbours of the last step */
     ascc_engine engine;

@@ -47,7 +47,7 @@ static unsigned char *complete(const uint8_t *data, size_t size, size_t *made)
     const size_t d = 2 + (fuzz_take(&in, 1) & 1);
     const uint64_t share = fuzz_take(&in, 1);
     const size_t head = 4, given = in.left / 8, body = given > head ? given - head : 0;
-    const size_t fluid_words = 2 * d + 2, wall_words = 6 * d + 2;
+    const size_t fluid_words = 2 * d + 3, wall_words = 6 * d + 2;
     const size_t walls = body * (size_t)share / 256 / wall_words;
     const size_t fluid = (body - walls * wall_words) / fluid_words;
     const size_t rows = HEADER + fluid * fluid_words + walls * wall_words;
@@ -55,18 +55,20 @@ static unsigned char *complete(const uint8_t *data, size_t size, size_t *made)
     unsigned char *bytes = calloc(words, 8);
     fuzz_require(bytes != NULL);
     put(bytes, 0, UINT64_C(0x50414e5343435341));
-    put(bytes, 1, 3);
+    put(bytes, 1, 4);
     put(bytes, 2, d);
     put(bytes, 3, fluid);
     put(bytes, 4, walls);
     for (size_t w = 5; w + 1 < words; w++)
         put(bytes, w, fuzz_take(&in, 8));
     const size_t fluid_ids = HEADER + fluid * (2 * d + 1);
-    const size_t wall_ids = HEADER + fluid * fluid_words + walls * 3 * d;
+    const size_t wall_ids = HEADER + fluid * (fluid_words - 1) + walls * 3 * d;
     for (size_t i = 0; i < fluid; i++)
         put(bytes, fluid_ids + i, i + 1);
     for (size_t i = 0; i < walls; i++)
         put(bytes, wall_ids + i, fluid + i + 1);
+    for (size_t w = rows - fluid; w < rows; w++) /* at rest: 32 bits */
+        put(bytes, w, (uint64_t)(int64_t)(int32_t)(uint32_t)get(bytes, w));
     for (size_t i = 0; i < walls * bodies; i++) /* all of one body */
         put(bytes, wall_ids + walls + i, 0);
     if (bodies) {

@@ -27,6 +27,7 @@ class LadderStatistics:
     momentum_after: Quanta
     external_impulse: Quanta
     wall_impulse: Quanta
+    support_impulse: Quanta
 
 
 class Ladder(_Handle):
@@ -149,7 +150,13 @@ class Ladder(_Handle):
         values: Dict[str, Any] = {
             name: getattr(raw, name) for name in LadderStatistics.__dataclass_fields__
         }
-        for name in ("momentum_before", "momentum_after", "external_impulse", "wall_impulse"):
+        for name in (
+            "momentum_before",
+            "momentum_after",
+            "external_impulse",
+            "wall_impulse",
+            "support_impulse",
+        ):
             values[name] = tuple(values[name])
         for name in ("predicted", "steps_on"):
             values[name] = tuple(values[name][: raw.rung_count])

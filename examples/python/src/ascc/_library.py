@@ -232,6 +232,7 @@ class StepOptions(Sized):
         ("max_displacement", c_double),
         ("max_neighbors", c_int32),
         ("substeps", c_int32),
+        ("sleep_speed", c_double),
     ]
 
 
@@ -273,6 +274,8 @@ class StepStatistics(Sized):
         ("compression_after", Compression),
         ("sweeps", c_uint64),
         ("substeps_total", c_uint64),
+        ("asleep", c_uint64),
+        ("support_impulse", ctypes.c_int64 * 3),
     ]
 
 
@@ -308,6 +311,7 @@ class LadderStatistics(Sized):
         ("momentum_after", ctypes.c_int64 * 3),
         ("external_impulse", ctypes.c_int64 * 3),
         ("wall_impulse", ctypes.c_int64 * 3),
+        ("support_impulse", ctypes.c_int64 * 3),
     ]
 
 
@@ -354,6 +358,8 @@ _FUNCTIONS: Dict[str, Tuple[Any, List[Any]]] = {
     "particles_get_momentum": (_INT, [c_void_p, c_size_t, c_size_t, c_void_p]),
     "particles_total_momentum": (_INT, [c_void_p, c_void_p]),
     "particles_body_impulse": (_INT, [c_void_p, c_int32, c_void_p, c_void_p, c_void_p]),
+    "particles_get_asleep": (_INT, [c_void_p, c_size_t, c_size_t, c_void_p]),
+    "particles_wake": (_INT, [c_void_p]),
     "particles_snapshot_size": (c_size_t, [c_void_p]),
     "particles_snapshot": (_INT, [c_void_p, c_void_p, c_size_t]),
     "particles_restore": (_INT, [c_void_p, c_char_p, c_size_t]),

@@ -691,6 +691,22 @@ class Particles(_Handle):
 
     # The whole state
 
+    @property
+    def asleep(self) -> NDArray[np.bool_]:
+        """Which fluid sleeps, after steps with a sleep_speed."""
+        with self._guard:
+            count = int(library.particles_count(self._handle, Kind.FLUID))
+            flags = np.empty(count, np.uint8)
+            self.context._check(
+                library.particles_get_asleep(self._handle, 0, count, flags.ctypes.data)
+            )
+        return flags.astype(np.bool_)
+
+    def wake(self) -> None:
+        """Wakes all fluid."""
+        with self._guard:
+            self._check(library.particles_wake(self._handle))
+
     def snapshot(self) -> bytes:
         """The whole state: same bytes for same state, on any machine."""
         with self._guard:
@@ -755,6 +771,8 @@ class Statistics:
     compression_after: Compression
     sweeps: int
     substeps_total: int
+    asleep: int
+    support_impulse: Quanta
 
 
 class Step(_Handle):
@@ -765,6 +783,7 @@ class Step(_Handle):
     max_displacement  length unit that a particle may move in a step; 0 = 64 spacings
     max_neighbors     of one point; 0 = 4096
     substeps          a time step is cut into: 0 = what the model's range asks for, n = at most n, -1 = none
+    sleep_speed       fluid slower than this, in what gravity gives in a step, stops; 0 = none
     context           whose threads are used; None = the model's
     """
 
@@ -779,6 +798,7 @@ class Step(_Handle):
         max_displacement: float = 0.0,
         max_neighbors: int = 0,
         substeps: int = 0,
+        sleep_speed: float = 0.0,
         context: Optional[Context] = None,
     ) -> None:
         self.context = context or model.context
@@ -788,6 +808,7 @@ class Step(_Handle):
             max_displacement=max_displacement,
             max_neighbors=_int32("max_neighbors", max_neighbors),
             substeps=_int32("substeps", substeps),
+            sleep_speed=sleep_speed,
         )
         handle = ctypes.c_void_p()
         self.context._check(
@@ -846,7 +867,13 @@ class Step(_Handle):
         values: Dict[str, Any] = {
             name: getattr(raw, name, None) for name in Statistics.__dataclass_fields__
         }
-        for name in ("momentum_before", "momentum_after", "external_impulse", "wall_impulse"):
+        for name in (
+            "momentum_before",
+            "momentum_after",
+            "external_impulse",
+            "wall_impulse",
+            "support_impulse",
+        ):
             values[name] = tuple(values[name])
         for name in ("compression_before", "compression_after"):
             values[name] = Compression(values[name].mean, values[name].largest)
