@@ -74,6 +74,31 @@ static int32_t relaxation_key(ascc_network *network, int32_t source)
     return best < 0 ? find_key(network, &wanted) : best;
 }
 
+/* How far from fluid walls can be that are in some list: of its own points, or of a level's where fluid is. Where
+ * walls have rows of their own in layers, they reach on from one to the next. */
+static double wall_reach(const ascc_network *network)
+{
+    const ascc_plan *plan = network->plan;
+    double reach = 0.0;
+    if (plan->centroid_anchor || (plan->level_count > 1 && !plan->fluid_sampled))
+        return INFINITY;
+    for (int32_t l = 0; l < plan->layer_count; l++)
+        if (plan->layer[l].set == ASCC_SET_ALL || plan->layer[l].set == ASCC_SET_BOUNDARY ||
+            plan->layer[l].set == ASCC_SET_EDGES)
+            return INFINITY;
+    for (int32_t k = 0; k < network->key_count; k++) {
+        const ascc_list_key *key = &network->key[k];
+        if (key->query == ASCC_SET_ALL || key->source == ASCC_SET_ALL ||
+            key->query == ASCC_SET_BOUNDARY)
+            return INFINITY;
+        const int32_t level = key->query >= ASCC_SET_LEVEL ? key->query - ASCC_SET_LEVEL + 1 : 0;
+        const double apart = level ? (1.0 + plan->hysteresis) * plan->level[level].voxel : 0.0;
+        if (key->source == ASCC_SET_BOUNDARY)
+            reach = fmax(reach, key->radius + apart);
+    }
+    return plan->sampling == ASCC_SAMPLING_FARTHEST && plan->level_count > 1 ? INFINITY : reach;
+}
+
 static size_t key_capacity(const ascc_plan *plan)
 {
     return ((size_t)plan->term_count + 1) * ASCC_MAX_LISTS + 3;
@@ -121,6 +146,7 @@ ascc_status ascc_network_create(ascc_network *network, const ascc_allocator *all
             plan->relaxation.pressure.count
                 ? relaxation_key(network, i == 0 ? ASCC_SET_FLUID : ASCC_SET_BOUNDARY)
                 : -1;
+    network->wall_reach = wall_reach(network);
     return ASCC_OK;
 }
 

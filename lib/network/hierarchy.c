@@ -23,7 +23,7 @@ static size_t keep_boundary(uint32_t *kept, const ascc_plan *plan, const ascc_sc
         }
     size_t count = 0;
     for (size_t i = 0; i < scene->boundary_count; i++) {
-        bool inside = true;
+        bool inside = !scene->near || scene->near[i];
         for (size_t c = 0; crops && c < d; c++) {
             const double x = scene->boundary[i * d + c];
             inside &= x >= low[c] - plan->boundary_crop && x <= high[c] + plan->boundary_crop;

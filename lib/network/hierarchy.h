@@ -32,6 +32,7 @@ typedef struct ascc_hierarchy {
 typedef struct ascc_scene {
     size_t fluid_count, boundary_count;
     const double *fluid, *boundary; /* [count][dimension] */
+    const uint8_t *near;            /* [boundary count] 1 = fluid may see it; NULL = all */
     /* What tells particles at one place apart, so that the host's order does not; NULL = nothing: */
     const double *velocity, *mass, *normal; /* [fluid][dimension], [fluid], [boundary][dimension] */
 } ascc_scene;

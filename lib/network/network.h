@@ -26,6 +26,8 @@ typedef struct ascc_network {
     ascc_list_key *key;                  /* [key_count] of all neighbour lists */
     int32_t (*term_key)[ASCC_MAX_LISTS]; /* [term_count + 1], last: the output; -1 = none */
     int32_t edge_key;                    /* whose entries are the edges; -1 = there are none */
+    /* m: a wall farther than this from all fluid, on every axis, is not seen; or INFINITY */
+    double wall_reach;
     int32_t relaxation_key[2]; /* fluid and walls around the fluid; -1 = there is no relaxation */
     uint8_t *wants;            /* [value_count] ASCC_WANTS_* */
     int32_t *last_reader;      /* [value_count] layers; layer_count: the output */

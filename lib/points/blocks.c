@@ -4,6 +4,8 @@
 #include <math.h>
 #include <string.h>
 
+#define FARTHEST 1e18
+
 size_t ascc_blocks_slots(size_t most)
 {
     size_t slots = 64;
@@ -20,8 +22,9 @@ void ascc_blocks_open(ascc_blocks *blocks, int64_t (*at)[3], uint32_t *slot, siz
 
 void ascc_block_of(const double *place, int32_t dimension, double edge, int64_t at[3])
 {
-    for (int32_t c = 0; c < 3; c++)
-        at[c] = c < dimension ? (int64_t)floor(place[c] / edge) : 0;
+    for (int32_t c = 0; c < 3; c++) /* what is farther than integers reach is cut */
+        at[c] =
+            c < dimension ? (int64_t)fmax(-FARTHEST, fmin(FARTHEST, floor(place[c] / edge))) : 0;
 }
 
 /* Where the block is, or would be. */

@@ -34,8 +34,8 @@ static double whole_area(const ascc_plan *plan)
     return plan->dimension == 2 ? 0.75 * support : 7.0 * pi / 40.0 * support * support;
 }
 
-/* Features of all particles in the host's order; vectors in metres. */
-static bool lend_features(ascc_step_state *state)
+/* Features of particles in the host's order, of walls that are near; vectors in metres. */
+static bool lend_features(ascc_step_state *state, const uint8_t *near)
 {
     const ascc_plan *plan = state->network->plan;
     const ascc_particles *p = state->particles;
@@ -57,6 +57,8 @@ static bool lend_features(ascc_step_state *state)
                     state->advance.velocity + i * d, unit, motion, gravity, 0.0,
                     state->fluid_features + i * fluid);
     for (size_t i = 0; i < p->boundary_count; i++) {
+        if (near && !near[i])
+            continue;
         const double area = whole > 0.0 ? whole * (double)state->walls->volume[i] : 1.0;
         features_of(plan, plan->boundary_features, plan->boundary_feature_count,
                     p->wall_normal + i * d, area, 0.0, gravity, area,
@@ -128,7 +130,9 @@ ascc_status ascc_stage_sight(ascc_step_state *state)
     if (status != ASCC_OK)
         return status;
     state->before_features = ascc_arena_mark_of(tools->arena);
-    const bool room = lend_features(state);
+    uint8_t *near = NULL;
+    const bool room = ascc_near_walls(state, &near) && lend_features(state, near);
+    scene.near = near;
     const ascc_arena_mark before_scene = ascc_arena_mark_of(tools->arena);
     scene.fluid = scaled(tools, state->advance.seen, p->fluid_count * d, state->length_unit);
     scene.boundary = scaled(tools, p->wall_position, p->boundary_count * d, state->length_unit);

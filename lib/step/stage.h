@@ -102,6 +102,9 @@ ascc_status ascc_stage_wall_motion(ascc_step_state *state);
 ascc_status ascc_stage_sleep(ascc_step_state *state);
 /* Takes what sleeping rows have received. */
 ascc_status ascc_stage_support(ascc_step_state *state);
+/* Marks the walls that fluid may see, in memory that the arena lends: *near stays NULL where it may see all, or where
+ * finding out would not pay. False without memory. */
+bool ascc_near_walls(ascc_step_state *state, uint8_t **near);
 /* Features, and the point sets of the scene (paper sections 3.3, 3.4). errors: MEMORY, RANGE. */
 ascc_status ascc_stage_sight(ascc_step_state *state);
 /* New momenta and positions. errors: RANGE, NOT_FINITE; the message names the particle. */

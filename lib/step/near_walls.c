@@ -1,0 +1,105 @@
+/* Walls that fluid may see: all others cost next to nothing. SPDX-License-Identifier: MIT
+ *
+ * Fluid and walls fall into blocks as wide as walls can be seen from, and somewhat wider; a wall is near if there is fluid in its
+ * block or in one beside it.
+ */
+#include <math.h>
+#include <string.h>
+
+#include "points/blocks.h"
+#include "stage.h"
+
+/* Fewer walls than a share of the fluid are not worth the look at it. */
+#define WORTH 8
+/* Spacings beyond the reach: contact follows a particle's whole way. Where one goes farther even without what the
+ * network gives, all walls are near. */
+#define MARGIN 4.0
+
+/* The blocks of places; they follow one another mostly in one block. */
+static void add_places(ascc_blocks *blocks, const double *place, size_t count, int32_t dimension,
+                       double edge)
+{
+    int64_t at[3], last[3] = {INT64_MAX, 0, 0};
+    for (size_t i = 0; i < count; i++) {
+        ascc_block_of(place + i * (size_t)dimension, dimension, edge, at);
+        if (memcmp(at, last, sizeof at) != 0)
+            (void)ascc_blocks_add(blocks, at);
+        memcpy(last, at, sizeof last);
+    }
+}
+
+/* And those beside them. */
+static void widen(ascc_blocks *wide, const ascc_blocks *blocks, int32_t dimension)
+{
+    const int64_t deep = dimension == 3;
+    for (size_t b = 0; b < blocks->count; b++)
+        for (int64_t z = -deep; z <= deep; z++)
+            for (int64_t y = -1; y <= 1; y++)
+                for (int64_t x = -1; x <= 1; x++)
+                    (void)ascc_blocks_add(wide, (const int64_t[]){blocks->at[b][0] + x,
+                                                                  blocks->at[b][1] + y,
+                                                                  blocks->at[b][2] + z});
+}
+
+static bool lend_blocks(ascc_blocks *blocks, ascc_arena *arena, size_t most)
+{
+    const size_t slots = ascc_blocks_slots(most);
+    int64_t(*at)[3] = ascc_arena_lend(arena, most, sizeof *at);
+    uint32_t *slot = ascc_arena_lend(arena, slots, sizeof *slot);
+    if (at && slot)
+        ascc_blocks_open(blocks, at, slot, slots);
+    return at && slot;
+}
+
+static void mark(uint8_t *near, const ascc_blocks *wide, const ascc_particles *p, double edge)
+{
+    int64_t at[3], last[3] = {INT64_MAX, 0, 0};
+    uint8_t found = 0;
+    for (size_t i = 0; i < p->boundary_count; i++) {
+        ascc_block_of(p->wall_position + i * (size_t)p->dimension, p->dimension, edge, at);
+        if (memcmp(at, last, sizeof at) != 0)
+            found = ascc_blocks_find(wide, at) != ASCC_NO_BLOCK;
+        memcpy(last, at, sizeof last);
+        near[i] = found;
+    }
+}
+
+/* Whether a particle goes so far on some axis. */
+static bool goes_far(const ascc_step_state *state, double far)
+{
+    const ascc_particles *p = state->particles;
+    const size_t numbers = p->fluid_count * (size_t)p->dimension;
+    const double square = far * far;
+    bool goes = false;
+    for (size_t k = 0; k < numbers; k++) {
+        const double way =
+            state->motion->time_step * state->advance.velocity[k]; /* wherever it is seen */
+        goes |= !(way * way <= square);
+    }
+    return goes;
+}
+
+bool ascc_near_walls(ascc_step_state *state, uint8_t **near)
+{
+    const ascc_particles *p = state->particles;
+    ascc_arena *arena = state->tools.arena;
+    const double margin = MARGIN * state->network->plan->spacing / state->length_unit;
+    const double edge = margin + state->network->wall_reach / state->length_unit;
+    if (!(state->network->wall_reach > 0.0) || isinf(edge) || state->advance.walls_move ||
+        p->boundary_count < p->fluid_count / WORTH || goes_far(state, margin))
+        return true;
+    *near = ascc_arena_lend(arena, p->boundary_count, 1);
+    const ascc_arena_mark mark_of = ascc_arena_mark_of(arena);
+    ascc_blocks blocks, wide;
+    bool room = *near && lend_blocks(&blocks, arena, p->fluid_count);
+    if (room) {
+        add_places(&blocks, state->advance.seen, p->fluid_count, p->dimension, edge);
+        room = lend_blocks(&wide, arena, blocks.count * (p->dimension == 3 ? 27 : 9));
+    }
+    if (room) {
+        widen(&wide, &blocks, p->dimension);
+        mark(*near, &wide, p, edge);
+    }
+    ascc_arena_return(arena, mark_of);
+    return room;
+}
