@@ -68,7 +68,8 @@ static void describe(const request *q, const recipe *r, const flow *f, const wal
                          .rest_density = 1000.0,
                          .count = r->count,
                          .walls = walls->count,
-                         .first_layer = walls->layer_count[0]};
+                         .first_layer = walls->layer_count[0],
+                         .walls_move = flow_walls_move(f)};
     memcpy(s->gravity, r->gravity, sizeof s->gravity);
     flow_describe(f, walls, solver, sizeof solver);
     (void)snprintf(s->source, sizeof s->source,
@@ -77,11 +78,12 @@ static void describe(const request *q, const recipe *r, const flow *f, const wal
                    r->text);
 }
 
-static bool write_frames(const request *q, const recipe *r, flow *solver,
+static bool write_frames(const request *q, const recipe *r, flow *solver, size_t wall_count,
                          ascc_sequence_writer *writer, char *error, size_t capacity)
 {
-    const size_t values = r->count * (size_t)r->dimension;
-    float *frame = malloc(2 * values * sizeof *frame);
+    const size_t values = r->count * (size_t)r->dimension,
+                 walls = wall_count * (size_t)r->dimension;
+    float *frame = malloc(2 * (values + walls) * sizeof *frame), *wall = frame + 2 * values;
     bool good = frame != NULL;
     if (!good)
         (void)snprintf(error, capacity, "no memory for a frame");
@@ -94,6 +96,10 @@ static bool write_frames(const request *q, const recipe *r, flow *solver,
         flow_read(solver, frame);
         good = ascc_sequence_append(
             writer, frame, f == 0 || q->all_velocities ? frame + values : NULL, error, capacity);
+        if (good && flow_walls_move(solver)) {
+            flow_read_walls(solver, wall, wall + walls);
+            good = ascc_sequence_append_walls(writer, wall, wall + walls, error, capacity);
+        }
     }
     free(frame);
     return good;
@@ -121,7 +127,7 @@ static bool make_sequence(const request *q, const char *path, uint64_t number, i
     bool good = header.wall && header.normal;
     ascc_sequence_writer *writer =
         good ? ascc_sequence_create(path, &header, q->all_velocities, error, capacity) : NULL;
-    good = writer && write_frames(q, &r, solver, writer, error, capacity);
+    good = writer && write_frames(q, &r, solver, walls.count, writer, error, capacity);
     if (writer) {
         char late[256];
         const bool finished = ascc_sequence_finish(writer, good, late, sizeof late);

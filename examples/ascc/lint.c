@@ -53,7 +53,8 @@ static bool lint_file(const char *path, const inspect_limits *limits, bool *head
                            .velocity = s.velocity_frames ? s.velocity : NULL,
                            .walls = s.first_layer,
                            .wall = s.wall,
-                           .normal = s.normal};
+                           .normal = s.normal,
+                           .wall_stride = s.walls_move ? s.walls * (size_t)s.dimension : 0};
     memcpy(input.gravity, s.gravity, sizeof input.gravity);
     inspection f;
     const ascc_status status = inspect(&input, limits, &f);

@@ -16,6 +16,9 @@ ascc_status flow_advance(flow *f, double dt);
 
 /* Positions and velocities into frame[2][count * dimension]. */
 void flow_read(const flow *f, float *frame);
+/* Whether walls move, and where they are: [walls][dimension] each, in the order that flow_create gave. */
+bool flow_walls_move(const flow *f);
+void flow_read_walls(const flow *f, float *position, float *normal);
 double flow_mass(const flow *f);
 /* The solver and its settings in words. */
 void flow_describe(const flow *f, const wall_points *walls, char *text, size_t capacity);

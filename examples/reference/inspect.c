@@ -17,7 +17,8 @@ typedef struct work {
     double *point;          /* [count + walls][3] */
     uint8_t *fast, *out;    /* [count] particles already counted */
     double *density;        /* [count] of one frame */
-    double low[3], high[3]; /* of the walls */
+    double low[3], high[3]; /* of the walls, in all frames */
+    const float *normal;    /* of the walls, in this one */
     inspection *found;
 } work;
 
@@ -52,14 +53,17 @@ static void find_reach(work *w)
     const inspect_input *in = w->input;
     const size_t d = (size_t)in->dimension;
     const float *points = in->walls ? in->wall : in->position;
-    const size_t count = in->walls ? in->walls : in->count * in->frames;
+    const size_t count = in->walls ? in->walls : in->count;
+    const size_t stride = in->walls ? in->wall_stride : in->count * d;
+    const size_t frames = stride ? in->frames : 1;
     double fall = 0.0, speed = 0.0;
     for (size_t c = 0; c < d; c++) {
         w->low[c] = INFINITY;
         w->high[c] = -INFINITY;
-        for (size_t i = 0; i < count; i++) {
-            w->low[c] = fmin(w->low[c], points[i * d + c]);
-            w->high[c] = fmax(w->high[c], points[i * d + c]);
+        for (size_t k = 0; k < frames * count; k++) {
+            const double x = points[k / count * stride + k % count * d + c];
+            w->low[c] = fmin(w->low[c], x);
+            w->high[c] = fmax(w->high[c], x);
         }
         fall += 2.0 * fabs(in->gravity[c]) * (w->high[c] - w->low[c]);
     }
@@ -103,7 +107,7 @@ static void look_at_motion(work *w, size_t frame)
 static double height_above(const work *w, size_t i, size_t j)
 {
     const inspect_input *in = w->input;
-    const float *normal = in->normal + (j - in->count) * (size_t)in->dimension;
+    const float *normal = w->normal + (j - in->count) * (size_t)in->dimension;
     double above = 0.0;
     for (int c = 0; c < in->dimension; c++)
         above += (w->point[i * 3 + (size_t)c] - w->point[j * 3 + (size_t)c]) * normal[c];
@@ -172,6 +176,10 @@ static ascc_status look_at_frame(work *w, size_t frame)
     for (size_t i = 0; i < in->count; i++)
         for (size_t c = 0; c < d; c++)
             w->point[i * 3 + c] = in->position[(frame * in->count + i) * d + c];
+    for (size_t i = 0; i < in->walls; i++)
+        for (size_t c = 0; c < d; c++)
+            w->point[(in->count + i) * 3 + c] = in->wall[frame * in->wall_stride + i * d + c];
+    w->normal = in->normal + frame * in->wall_stride;
     near_forget(w->lists);
     const ascc_status status = near_update(w->lists, in->count, in->walls, w->point, 3);
     if (status != ASCC_OK)
@@ -225,9 +233,6 @@ static ascc_status look(work *w)
     w->density = calloc(in->count, sizeof *w->density);
     if (!w->lists || !w->point || !w->fast || !w->out || !w->density)
         return ASCC_ERROR_MEMORY;
-    for (size_t i = 0; i < in->walls; i++)
-        for (size_t c = 0; c < (size_t)in->dimension; c++)
-            w->point[(in->count + i) * 3 + c] = in->wall[i * (size_t)in->dimension + c];
     find_reach(w);
     ascc_status status = ASCC_OK;
     for (size_t frame = 0; status == ASCC_OK && frame < in->frames; frame++) {

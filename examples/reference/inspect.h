@@ -22,6 +22,7 @@ typedef struct inspect_input {
     const float *velocity;      /* [count][dimension] of the first frame, or NULL */
     size_t walls;               /* points that touch the fluid */
     const float *wall, *normal; /* [walls][dimension] */
+    size_t wall_stride;         /* numbers from one frame's to the next's; 0 = at rest */
 } inspect_input;
 
 /* What a sequence may have at most; zero is the default. */

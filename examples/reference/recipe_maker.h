@@ -60,4 +60,10 @@ void make_jet(maker *m);
 void make_space(maker *m);
 void make_viscous(maker *m);
 
+/* Kinds of recipes_moving.c. */
+void make_paddle(maker *m);
+void make_turning(maker *m);
+void make_floating(maker *m);
+void make_sinking(maker *m);
+
 #endif

@@ -309,6 +309,11 @@ const char *const recipe_kinds[][2] = {
     {"jet", "a jet of 5 to 25 m/s against a wall (half of that in 2D)"},
     {"space", "1 to 4 drops that spin and meet, without gravity or walls"},
     {"viscous", "as obstacles, with 0.1 to 50 times the viscosity"},
+    {"paddle", "a plate that goes to and fro in a pool"},
+    {"turning-tank", "a tank that begins to turn about a level axis"},
+    {"floating-body",
+     "a box or ball of 0.2 to 0.8 of water's density, let go at the surface of a pool"},
+    {"sinking-body", "the same of 1.5 to 4 times water's density"},
     {NULL, NULL}};
 
 static const struct {
@@ -326,8 +331,19 @@ static const struct {
     {make_filling, 3, 100, true, 200, 3000},  {make_draining, 3, 150, true, 400, 4000},
     {make_held, 3, 100, true, 400, 5000},     {make_film, 3, 80, true, 300, 5000},
     {make_jet, 3, 40, true, 200, 3000},       {make_space, 3, 100, true, 200, 5000},
-    {make_viscous, 3, 100, true, 600, 4000},
+    {make_viscous, 3, 100, true, 600, 4000},  {make_paddle, 3, 100, true, 400, 5000},
+    {make_turning, 3, 100, true, 300, 5000},  {make_floating, 3, 80, true, 400, 5000},
+    {make_sinking, 3, 25, true, 400, 5000},
 };
+
+/* Walls of DFSPH can. */
+static bool moves(const recipe *r)
+{
+    bool any = false;
+    for (size_t i = 0; i < r->solid_count; i++)
+        any |= r->motion[i].kind != RIGID_STILL;
+    return any;
+}
 
 ascc_status recipe_make(const char *kind, const recipe_options *options, recipe *made)
 {
@@ -353,6 +369,10 @@ ascc_status recipe_make(const char *kind, const recipe_options *options, recipe 
         made->viscosity = 0.18 * pow(made->spacing, 1.5);
         m.capacity = m.text_length = 0;
         kinds[k].make(&m);
+        if (made->solver != RECIPE_DFSPH && moves(made)) {
+            recipe_free(made);
+            return ASCC_ERROR_ARGUMENT;
+        }
         for (int c = 0; c < 3 && options->gravity > 0.0; c++) {
             made->gravity[c] *= options->gravity;
             made->settle_gravity[c] *= options->gravity;

@@ -6,6 +6,7 @@
 #ifndef REFERENCE_RECIPES_H
 #define REFERENCE_RECIPES_H
 
+#include "rigid.h"
 #include "solids.h"
 #include "sph.h"
 
@@ -26,6 +27,15 @@ typedef struct recipe_options {
     int32_t reserved;
 } recipe_options;
 
+/* How a solid moves; zero is at rest. It may not touch others. */
+typedef struct recipe_motion {
+    rigid_kind kind;
+    int32_t reserved;
+    double density;       /* kg/m^3, of a free one */
+    double spin, spin_up; /* of a driven one: 1/s about z, with a delay of so many s */
+    double reach, rate; /* likewise: its x goes to and fro as reach (1 - cos(rate t)), m and 1/s */
+} recipe_motion;
+
 typedef struct recipe {
     uint64_t number;
     int32_t dimension, frames;
@@ -39,6 +49,7 @@ typedef struct recipe {
     size_t settled; /* particles that settle: the first so many, the rest comes later; 0 = all */
     double speed;   /* m/s, that the flow may reach: the speed of sound is ten times that */
     solid solids[RECIPE_SOLIDS];
+    recipe_motion motion[RECIPE_SOLIDS]; /* of DFSPH; they rest while water settles */
     size_t solid_count;
     size_t count;
     double *position, *velocity; /* [count][dimension] */
@@ -49,7 +60,7 @@ typedef struct recipe {
 /* Names of the kinds, NULL at the end, and a line about each. */
 extern const char *const recipe_kinds[][2];
 
-/* errors: ARGUMENT (unknown kind, dimension), MEMORY. recipe_free after success only. */
+/* errors: ARGUMENT (unknown kind, dimension, a solver that cannot), MEMORY. recipe_free after success only. */
 ascc_status recipe_make(const char *kind, const recipe_options *options, recipe *made);
 void recipe_free(recipe *made);
 

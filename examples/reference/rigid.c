@@ -99,6 +99,14 @@ void rigid_move(rigid *b, double dt)
     turn_inertia(b);
 }
 
+void rigid_direction(const rigid *b, const double own[3], double direction[3])
+{
+    double axes[3][3];
+    matrix_of(b->turn, axes);
+    for (int c = 0; c < 3; c++)
+        direction[c] = axes[c][0] * own[0] + axes[c][1] * own[1] + axes[c][2] * own[2];
+}
+
 void rigid_point(const rigid *b, const double own[3], double point[3])
 {
     double axes[3][3];

@@ -38,6 +38,9 @@ void rigid_push(rigid *body, const double force[3], const double torque[3], doub
 /* Moves and turns it for dt; gyroscopic torque included. */
 void rigid_move(rigid *body, double dt);
 
+/* A direction of its own axes in the world's. */
+void rigid_direction(const rigid *body, const double own[3], double direction[3]);
+
 /* Where a point is that lies at `own` from the centre, in the body's own axes. */
 void rigid_point(const rigid *body, const double own[3], double point[3]);
 

@@ -1,6 +1,6 @@
 #!/bin/sh
 # Makes what 2D networks learn from in examples/train/runs/data2d: the scenes of water2d beside the given ones, ten
-# minutes; and a set over the whole range, with configs that train from it alone (runs/plain), about 0.05 core-hours.
+# minutes; and a set over the whole range, with configs that train from it alone (runs/plain), about 0.06 core-hours.
 # SPDX-License-Identifier: MIT
 # sh examples/train/data2d.sh [PROGRAM [SHARE [THREADS]]]     SHARE: per cent of the set over the range (100)
 set -eu
@@ -25,6 +25,10 @@ kind held-body 10 --dimension 2 --frames 300
 kind film 14 --dimension 2 --frames 300
 kind jet 10 --dimension 2 --frames 120
 kind space 14 --dimension 2 --frames 300
+kind paddle 8 --dimension 2 --frames 300
+kind turning-tank 8 --dimension 2 --frames 300
+kind floating-body 8 --dimension 2 --frames 300
+kind sinking-body 8 --dimension 2 --frames 140
 valid wbc2d
 valid obstacles --dimension 2 --frames 300
 valid drops --dimension 2 --frames 300

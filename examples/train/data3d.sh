@@ -1,6 +1,6 @@
 #!/bin/sh
 # Makes what 3D networks learn from in examples/train/runs/data3d: the scenes of water3d beside the given ones, minutes;
-# and a set over the whole range, with configs that train from it alone (runs/plain), about 0.4 core-hours.
+# and a set over the whole range, with configs that train from it alone (runs/plain), about 0.5 core-hours.
 # SPDX-License-Identifier: MIT
 # sh examples/train/data3d.sh [PROGRAM [SHARE [THREADS]]]     SHARE: per cent of the set over the range (100)
 set -eu
@@ -28,6 +28,10 @@ kind held-body 10
 kind film 14
 kind jet 10
 kind space 14
+kind paddle 8 --frames 60
+kind turning-tank 8 --frames 60
+kind floating-body 8 --frames 60
+kind sinking-body 8
 kind free-fall 3 --dimension 3 --frames 40
 valid liquid3d
 valid obstacles
