@@ -60,7 +60,7 @@ typedef struct rollout {
     ascc_motion motion;
     size_t numbers, walls; /* coordinates of the fluid, of the walls */
     double *wall, *normal; /* [boundary][dimension] */
-    size_t walls_frame;    /* that they are of, + 1; 0 = none yet */
+    bool walls_placed;
     double *truth;
     double *state;     /* [unroll + 1] positions before each step, and after the last */
     int64_t *momentum; /* [unroll] before each step */
@@ -99,23 +99,37 @@ static void truth_at(const rollout *r, size_t frame, double *to)
                                s->fluid_count, false, to);
 }
 
+/* How walls move from a frame to the next, m/s. */
+static void find_wall_velocities(rollout *r, size_t frame)
+{
+    const ascc_kept_sequence *s = r->task->sequence;
+    const size_t next = frame + 1 < s->frame_count ? frame + 1 : frame;
+    double *velocity = r->particles->wall_velocity;
+    ascc_rigid_transform_apply(&r->task->transform, s->dimension,
+                               s->wall + ascc_kept_sequence_walls(s, next), s->boundary_count,
+                               false, velocity);
+    for (size_t k = 0; k < r->walls; k++)
+        velocity[k] = (velocity[k] - r->wall[k]) / r->motion.time_step;
+}
+
 /* The walls where a frame has them, for losses, and for a step from that frame. */
 static void place_walls(rollout *r, size_t frame)
 {
     const ascc_kept_sequence *s = r->task->sequence;
     const ascc_rigid_transform *transform = &r->task->transform;
     const size_t at = ascc_kept_sequence_walls(s, frame);
-    if (r->walls_frame == frame + 1 || (s->wall_frames == 1 && r->walls_frame))
+    if (s->wall_frames == 1 && r->walls_placed)
         return;
     ascc_rigid_transform_apply(transform, s->dimension, s->wall + at, s->boundary_count, false,
                                r->wall);
     ascc_rigid_transform_apply(transform, s->dimension, s->normal + at, s->boundary_count, true,
                                r->normal);
-    r->walls_frame = frame + 1;
+    r->walls_placed = true;
     if (!r->particles || !r->walls)
         return;
     memcpy(r->particles->wall_position, r->wall, r->walls * sizeof *r->wall);
     memcpy(r->particles->wall_normal, r->normal, r->walls * sizeof *r->normal);
+    find_wall_velocities(r, frame);
 }
 
 /* Puts the particles where the sequence has them, with velocities by frame difference. */
