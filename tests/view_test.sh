@@ -111,11 +111,16 @@ printf '0 key t\n10 key space\n12 picture shown.png\n' >script
 # shellcheck disable=SC2086
 DISPLAY=:$(cat display) "$ascc" view $scene --script script >out 2>err &
 viewer=$!
-# What is shown is on the screen soon, and stays.
+# What is shown is on the screen soon after it is written, and stays; a machine may be busy.
 on_screen() {
-    for try in 1 2 3 4 5 6 7 8 9 10 11 12 13 14 15 16 17 18 19 20; do
-        [ -s shown.png ] && python3 "$tool" buffer/Xvfb_screen0 shown.png && return
-        sleep 0.3
+    tries=0
+    while [ ! -s shown.png ] && [ $tries -lt 400 ]; do
+        sleep 0.2
+        tries=$((tries + 1))
+    done
+    for try in 1 2 3 4 5 6 7 8 9 10; do
+        python3 "$tool" buffer/Xvfb_screen0 shown.png && return
+        sleep 0.5
     done
     cat err
     return 1
