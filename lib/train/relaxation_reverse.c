@@ -21,6 +21,12 @@ typedef struct neighbor {
     double by_g[3];          /* gradient */
 } neighbor;
 
+/* What sweeps read of a neighbour in the fluid: 32 bytes, some twenty times a step. */
+typedef struct fluid_pair {
+    double g[3];
+    size_t at;
+} fluid_pair;
+
 typedef struct reverse {
     const ascc_step_state *state;
     const ascc_relaxation *constants;
@@ -34,12 +40,14 @@ typedef struct reverse {
     double *before; /* [row][3] before the step, if corrections lie along those lines */
     size_t *start;  /* [row + 1] */
     neighbor *pair;
-    double *own;      /* [row][3] sum of g */
-    double *excess;   /* [row] what sweeps take away */
-    double *response; /* [row] */
-    double *pressure; /* [sweep + 1][row] */
-    double *push;     /* [sweep][row][3] by the pressure before it */
-    double *change;   /* [sweep][row] */
+    size_t *fluid_start; /* [row + 1] */
+    fluid_pair *fluid;   /* of `pair`, in its order */
+    double *own;         /* [row][3] sum of g */
+    double *excess;      /* [row] what sweeps take away */
+    double *response;    /* [row] */
+    double *pressure;    /* [sweep + 1][row] */
+    double *push;        /* [sweep][row][3] by the pressure before it */
+    double *change;      /* [sweep][row] */
     double repulsion;
     /* Gradients: */
     double *by_push;     /* [row][3] */
@@ -149,23 +157,29 @@ static bool take_pairs(reverse *r)
     }
     r->pair = ascc_arena_take(r->arena, most, sizeof *r->pair);
     r->start = ascc_arena_take(r->arena, r->count + 1, sizeof *r->start);
-    return r->pair && r->start;
+    r->fluid = ascc_arena_take(r->arena, most, sizeof *r->fluid);
+    r->fluid_start = ascc_arena_take(r->arena, r->count + 1, sizeof *r->fluid_start);
+    return r->pair && r->start && r->fluid && r->fluid_start;
 }
 
 /* Pairs, densities and responses at r->place. */
 static void find_geometry(reverse *r)
 {
     const double least = r->constants->epsilon * r->constants->lattice_response;
-    r->start[0] = 0;
+    size_t at = 0;
+    r->start[0] = r->fluid_start[0] = 0;
     for (size_t i = 0; i < r->count; i++) {
         double square = 0.0, own[3] = {0.0, 0.0, 0.0};
         r->excess[i] = look_around(r, i) - 1.0;
         for (size_t k = r->start[i]; k < r->start[i + 1]; k++) {
             const neighbor *n = &r->pair[k];
             square += n->fluid ? dot(n->g, n->g) : 0.0;
+            if (n->fluid)
+                r->fluid[at++] = (fluid_pair){{n->g[0], n->g[1], n->g[2]}, n->at};
             for (int c = 0; c < 3; c++)
                 own[c] += n->g[c];
         }
+        r->fluid_start[i + 1] = at;
         memcpy(r->own + i * 3, own, sizeof own);
         r->response[i] = 1.0 / (square + dot(own, own) + least);
     }
@@ -174,14 +188,16 @@ static void find_geometry(reverse *r)
 /* to[row] = -P pressure; of gradients: the adjoint of `divergence`, less its sign. */
 static void push(const reverse *r, const double *pressure, double *to)
 {
-    for (size_t i = 0; i < r->count; i++)
-        for (size_t c = 0; c < 3; c++) {
-            double sum = pressure[i] * r->own[i * 3 + c];
-            for (size_t k = r->start[i]; k < r->start[i + 1]; k++)
-                if (r->pair[k].fluid)
-                    sum += pressure[r->pair[k].at] * r->pair[k].g[c];
-            to[i * 3 + c] = -sum;
-        }
+    for (size_t i = 0; i < r->count; i++) {
+        double sum[3];
+        for (size_t c = 0; c < 3; c++)
+            sum[c] = pressure[i] * r->own[i * 3 + c];
+        for (size_t k = r->fluid_start[i]; k < r->fluid_start[i + 1]; k++)
+            for (int c = 0; c < 3; c++)
+                sum[c] += pressure[r->fluid[k].at] * r->fluid[k].g[c];
+        for (size_t c = 0; c < 3; c++)
+            to[i * 3 + c] = -sum[c];
+    }
 }
 
 /* to[row] = P^T move */
@@ -189,9 +205,8 @@ static void divergence(const reverse *r, const double *move, double *to)
 {
     for (size_t i = 0; i < r->count; i++) {
         double sum = dot(r->own + i * 3, move + i * 3);
-        for (size_t k = r->start[i]; k < r->start[i + 1]; k++)
-            if (r->pair[k].fluid)
-                sum -= dot(r->pair[k].g, move + r->pair[k].at * 3);
+        for (size_t k = r->fluid_start[i]; k < r->fluid_start[i + 1]; k++)
+            sum -= dot(r->fluid[k].g, move + r->fluid[k].at * 3);
         to[i] = sum;
     }
 }
@@ -232,18 +247,6 @@ static void sweep(reverse *r)
 
 /* ---- Back ---- */
 
-/* Gradients of pairs that a push by these pressures has, by_push being that of the pushes. */
-static void pass_push(reverse *r, const double *pressure, const double *by_push)
-{
-    for (size_t i = 0; i < r->count; i++)
-        for (size_t k = r->start[i]; k < r->start[i + 1]; k++) {
-            neighbor *n = &r->pair[k];
-            const double p = pressure[i] + (n->fluid ? pressure[n->at] : 0.0);
-            for (size_t c = 0; c < 3; c++)
-                n->by_g[c] -= p * by_push[i * 3 + c];
-        }
-}
-
 /* Gradients of pairs that a divergence of these moves has. */
 static void pass_divergence(reverse *r, const double *move, const double *by_change)
 {
@@ -253,6 +256,21 @@ static void pass_divergence(reverse *r, const double *move, const double *by_cha
             for (size_t c = 0; c < 3; c++)
                 n->by_g[c] +=
                     by_change[i] * (move[i * 3 + c] - (n->fluid ? move[n->at * 3 + c] : 0.0));
+        }
+}
+
+/* Gradients of pairs that a sweep has: its divergence, and the pushes before that by these pressures. */
+static void pass_sweep(reverse *r, const double *move, const double *by_change,
+                       const double *pressure, const double *by_push)
+{
+    for (size_t i = 0; i < r->count; i++)
+        for (size_t k = r->start[i]; k < r->start[i + 1]; k++) {
+            neighbor *n = &r->pair[k];
+            const double p = pressure[i] + (n->fluid ? pressure[n->at] : 0.0);
+            for (size_t c = 0; c < 3; c++)
+                n->by_g[c] +=
+                    by_change[i] * (move[i * 3 + c] - (n->fluid ? move[n->at * 3 + c] : 0.0)) -
+                    p * by_push[i * 3 + c];
         }
 }
 
@@ -271,11 +289,10 @@ static void sweep_back(reverse *r, int32_t s)
         by_change[i] = by * r->response[i];
         r->by_excess[i] += by_change[i];
     }
-    pass_divergence(r, pushes, by_change);
     push(r, by_change, by_push);
     for (size_t k = 0; k < 3 * r->count; k++)
         by_push[k] = -by_push[k];
-    pass_push(r, pressure, by_push);
+    pass_sweep(r, pushes, by_change, pressure, by_push);
     divergence(r, by_push, r->scratch);
     for (size_t i = 0; i < r->count; i++)
         r->by_pressure[i] -= r->scratch[i];
