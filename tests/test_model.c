@@ -674,6 +674,13 @@ static void wrong_graph_networks_are_refused_by_name(void **state)
         const char *from, *to, *hint;
     } cases[] = {
         {"\"edges\":{\"points\":\"all\"", "\"edges\":{\"points\":\"level1\"", "'edges'"},
+        {"\"history\":2", "\"history\":9", "'history'"},
+        {"\"history\":2", "\"history\":0", "'history'"},
+        {"\"history\":2", "\"history\":3",
+         "'i.fluid.kernel' has the shape [7, 4], but must have [9, 4]"},
+        {",\"history\":2", "", "'history' is 0, but the fluid has a feature 'history'"},
+        {",\"history\"]", "]", "'history' is 2, but the fluid has no feature 'history'"},
+        {"\"boundary\":[\"one\"", "\"boundary\":[\"history\"", "boundary"},
         {"\"edges\":{\"points\":\"all\"", "\"edges\":{\"points\":\"fluid\"", "'gather'"},
         {"\"edges\":{\"points\":\"all\"", "\"edges\":{\"limit\":3,\"points\":\"all\"", "'limit'"},
         {"\"edges\":{", "\"edges\":{\"radius\":0,", "'radius'"},

@@ -189,6 +189,7 @@ static void graph(int v, model_random *r)
 {
     r->plain = 1;
     r->graph = 1 + v / 2 % 2;
+    r->history = v / 3 % 3;
     r->fluid_only = v / 4 % 2;
     r->radius = 1.45;
     r->evaluate = evaluations[v / 3 % 3];
@@ -400,6 +401,11 @@ static double step_of(bench *b, oracle_mode mode, double *after, double *correct
     double velocity[MAX_POINTS * 3], sum = 0.0;
     memcpy(after, b->position, sizeof b->position);
     memcpy(velocity, b->velocity, sizeof velocity);
+    double past[MAX_POINTS * 3 * ASCC_MAX_HISTORY]; /* a set that has not been stepped yet */
+    const size_t history = (size_t)b->model->plan.history, d = (size_t)b->model->plan.dimension;
+    for (size_t k = 0; k < numbers * history; k++)
+        past[k] = b->s->velocity[k / d / history * d + k % d];
+    b->o.past = past;
     b->o.mode = mode;
     b->o.step = 0;
     oracle_step(&b->o, after, velocity, correction);

@@ -21,9 +21,10 @@ typedef struct world_options {
     int32_t dimension, threads, neighbor_limit;
     uint32_t cpu_disable;
     bool radial, walls, unequal, random_network;
-    bool gravity;                                   /* the random network sees it */
-    const char *method;                             /* of sampling; NULL = voxel centres */
-    int bumps, order, transfer, abstraction, graph; /* of the random network: see model_random */
+    bool gravity;       /* the random network sees it */
+    const char *method; /* of sampling; NULL = voxel centres */
+    int bumps, order, transfer, abstraction, graph,
+        history;      /* of the random network: see model_random */
     const char *type; /* of its weights, all of which every type holds */
     uint32_t shuffle;
     double far;  /* one more particle this far away; 0 = none */
@@ -46,6 +47,7 @@ static ascc_model *make_model(ascc_context *context, const world_options *o)
                                 .channels = 8,
                                 .spacing = spacing,
                                 .graph = o->graph,
+                                .history = o->history,
                                 .plain = o->graph,
                                 .projection = o->radial ? "radial" : "none",
                                 .scale = o->bumps ? 0.001 : 0.0,
@@ -426,7 +428,8 @@ static void a_graph_network_gives_the_same_bits_for_threads_cpu_and_order(void *
                            .threads = 1,
                            .random_network = true,
                            .walls = variant & 2,
-                           .graph = 1 + variant % 2};
+                           .graph = 1 + variant % 2,
+                           .history = 2 * variant};
         const uint64_t want = hash_after(&o, 5);
         for (o.threads = 2; o.threads <= 7; o.threads = o.threads * 2 + 1)
             assert_true(hash_after(&o, 5) == want);
@@ -539,10 +542,14 @@ static void many_steps_at_once_equal_single_steps(void **state)
     close_world(&b);
 }
 
-static void a_restored_run_goes_on_bit_for_bit(void **state)
+static void check_a_restored_run(bool history)
 {
-    (void)state;
-    const world_options o = {.dimension = 3, .threads = 2, .walls = true};
+    const world_options o = {.dimension = 3,
+                             .threads = 2,
+                             .walls = true,
+                             .random_network = history,
+                             .graph = history,
+                             .history = history ? 3 : 0};
     world w = open_world(&o);
     run(&w, down, 10);
     const size_t size = ascc_particles_snapshot_size(w.particles);
@@ -555,6 +562,47 @@ static void a_restored_run_goes_on_bit_for_bit(void **state)
     run(&w, down, 25);
     assert_true(ascc_particles_hash(w.particles) == want);
     free(memory);
+    close_world(&w);
+}
+
+static void a_restored_run_goes_on_bit_for_bit(void **state)
+{
+    (void)state;
+    check_a_restored_run(false);
+    check_a_restored_run(true);
+}
+
+/* What a step has added to the past is told by the velocities before it; particles that come later and sets that
+ * were never stepped have moved as they do. */
+static void a_history_is_what_the_velocities_were(void **state)
+{
+    (void)state;
+    const world_options o = {
+        .dimension = 2, .threads = 2, .random_network = true, .graph = 1, .history = 3};
+    world w = open_world(&o);
+    const size_t n = w.particles->fluid_count;
+    double *seen[4];
+    for (int t = 0; t < 4; t++) {
+        const ascc_array out = {.data = seen[t] = calloc(n * 2, sizeof(double)),
+                                .scalar = ASCC_DOUBLE};
+        assert_int_equal(ascc_particles_get(w.particles, ASCC_FLUID, ASCC_VELOCITY, 0, n, &out),
+                         ASCC_OK);
+        run(&w, no_gravity, 1);
+        assert_int_equal(w.particles->past_count, 3);
+        for (size_t k = 0; k < n * 2; k++)
+            for (int age = 0; age < 3; age++)
+                assert_true(w.particles->past[(k / 2 * 3 + (size_t)age) * 2 + k % 2] ==
+                            seen[t > age ? t - age : 0][k]);
+    }
+    const double place[2] = {9.0, 9.0}, fast[2] = {1.0, 0.5};
+    const ascc_const_array x = {.data = place, .scalar = ASCC_DOUBLE};
+    const ascc_const_array v = {.data = fast, .scalar = ASCC_DOUBLE};
+    assert_int_equal(ascc_particles_add_fluid(w.particles, 1, &x, &v, NULL, NULL), ASCC_OK);
+    assert_true(fabs(w.particles->past[n * 6 + 4] - 1.0) < 1e-6);
+    assert_true(fabs(w.particles->past[n * 6 + 5] - 0.5) < 1e-6);
+    assert_true(w.particles->past[n * 6 - 2] == seen[1][n * 2 - 2]);
+    for (int t = 0; t < 4; t++)
+        free(seen[t]);
     close_world(&w);
 }
 
@@ -836,6 +884,7 @@ static void a_steady_step_allocates_nothing(void **state)
                                                             .walls = true,
                                                             .random_network = random,
                                                             .graph = random == 3 ? 2 : 0,
+                                                            .history = random == 3,
                                                             .bumps = random == 2 ? 3 : 0,
                                                             .transfer = random == 2});
         world w = open_world(&o);
@@ -873,6 +922,7 @@ static void check_each_failing_allocation(int bumps, int graph)
                                                         .walls = true,
                                                         .random_network = true,
                                                         .graph = graph,
+                                                        .history = graph,
                                                         .bumps = bumps,
                                                         .transfer = bumps > 0});
     world w = open_world(&o);
@@ -1213,6 +1263,57 @@ static void a_failing_substep_takes_all_of_its_step_back(void **state)
     close_world(&w);
 }
 
+static uint64_t past_of(const ascc_particles *p)
+{
+    uint64_t sum = 0, bits;
+    for (size_t k = 0; k < p->fluid_count * (size_t)(p->past_count * p->dimension); k++) {
+        memcpy(&bits, &p->past[k], sizeof bits);
+        sum = sum * 31 + bits;
+    }
+    return sum;
+}
+
+static void a_failing_step_leaves_histories_as_they_were(void **state)
+{
+    (void)state;
+    const world_options o = {.dimension = 3,
+                             .threads = 1,
+                             .walls = true,
+                             .random_network = true,
+                             .graph = 1,
+                             .history = 3};
+    world w = open_world(&o);
+    run(&w, no_gravity, 3);
+    ascc_model_info info = {.size = sizeof info};
+    assert_int_equal(ascc_model_get_info(w.model, &info), ASCC_OK);
+    const double dt = info.time_step, start = 0.2 * spacing / dt;
+    double v[3] = {0.0, -start, 0.0};
+    const ascc_const_array velocity = {.data = v, .scalar = ASCC_DOUBLE};
+    for (size_t i = 0; i < w.particles->fluid_count; i++)
+        assert_int_equal(
+            ascc_particles_set(w.particles, ASCC_FLUID, ASCC_VELOCITY, i, 1, &velocity), ASCC_OK);
+    /* falls faster with each substep, until one moves a particle too far */
+    const double pull[3] = {0.0, -4.0 * spacing / dt / dt, 0.0};
+    const ascc_forces forces = {.size = sizeof forces, .gravity = pull};
+    const ascc_step_options far = {
+        .size = sizeof far, .time_step = 4.0 * dt, .max_displacement = 10.0 * spacing};
+    ascc_step *step;
+    assert_int_equal(ascc_step_create(w.context, w.model, &far, &step), ASCC_OK);
+    ascc_status status = ASCC_OK;
+    for (int n = 0; n < 20 && status == ASCC_OK; n++) {
+        const uint64_t hash = ascc_particles_hash(w.particles), past = past_of(w.particles);
+        status = ascc_step_run(step, w.particles, &forces, 1);
+        const bool same = ascc_particles_hash(w.particles) == hash && past_of(w.particles) == past;
+        assert_true(same == (status != ASCC_OK));
+    }
+    assert_int_equal(status, ASCC_ERROR_RANGE);
+    ascc_step_statistics s = {.size = sizeof s};
+    assert_int_equal(ascc_step_get_statistics(step, &s), ASCC_OK);
+    assert_true(s.steps == 0 && s.external_impulse[1] == 0);
+    ascc_step_destroy(&step);
+    close_world(&w);
+}
+
 static void a_way_of_more_than_64_spacings_is_an_error_unless_allowed(void **state)
 {
     (void)state;
@@ -1473,6 +1574,7 @@ int main(void)
         cmocka_unit_test(a_far_particle_changes_no_bit_of_the_others),
         cmocka_unit_test(many_steps_at_once_equal_single_steps),
         cmocka_unit_test(a_restored_run_goes_on_bit_for_bit),
+        cmocka_unit_test(a_history_is_what_the_velocities_were),
         cmocka_unit_test(a_host_in_centimetres_gets_the_same_motion),
         cmocka_unit_test(gravity_is_seen_alike_in_every_unit),
         cmocka_unit_test(nothing_passes_a_wall_with_contact),
@@ -1500,6 +1602,7 @@ int main(void)
         cmocka_unit_test(statistics_tell_what_happened),
         cmocka_unit_test(a_way_of_more_than_64_spacings_is_an_error_unless_allowed),
         cmocka_unit_test(a_failing_substep_takes_all_of_its_step_back),
+        cmocka_unit_test(a_failing_step_leaves_histories_as_they_were),
         cmocka_unit_test(a_long_time_step_is_cut_into_steps_of_the_model),
         cmocka_unit_test(particle_options_of_a_model_are_those_it_steps),
         cmocka_unit_test(a_set_of_any_spacing_is_stepped),

@@ -382,6 +382,27 @@ static void gradients_of_rollouts_through_set_abstractions_are_right(void **stat
     print_message("# set abstractions: %.2g\n", worst);
 }
 
+static void gradients_of_rollouts_through_graphs_and_histories_are_right(void **state)
+{
+    (void)state;
+    double worst = 0.0;
+    for (int v = 0; v < 4; v++) {
+        gradient_case c = {.name = "graph",
+                           .random = small_basis(2000 + (uint64_t)v, 2 + v % 2),
+                           .warm_up = v / 3,
+                           .unroll = 2 + v % 2,
+                           .constant_positions = v / 2,
+                           .samples = 6};
+        c.random.graph = 1 + v / 2;
+        c.random.history = v % 2 ? 3 : v;
+        c.random.radius = 1.45;
+        c.random.fluid_only = v / 2;
+        c.random.plain = 1;
+        worst = fmax(worst, check_gradient(&c));
+    }
+    print_message("# graphs: %.2g\n", worst);
+}
+
 static void gradients_of_penalties_are_right(void **state)
 {
     (void)state;
@@ -1138,6 +1159,7 @@ int main(void)
         cmocka_unit_test(gradients_of_rollouts_are_right),
         cmocka_unit_test(gradients_with_positions_as_constants_are_right),
         cmocka_unit_test(gradients_of_rollouts_through_set_abstractions_are_right),
+        cmocka_unit_test(gradients_of_rollouts_through_graphs_and_histories_are_right),
         cmocka_unit_test(gradients_of_penalties_are_right),
         cmocka_unit_test(gradients_through_the_relaxation_are_right),
         cmocka_unit_test(same_seed_gives_the_same_weights_for_any_threads),

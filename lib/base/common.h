@@ -77,4 +77,7 @@ static inline size_t ascc_max_size(size_t a, size_t b)
     return a > b ? a : b;
 }
 
+/* Most velocities of earlier steps that particles keep and models read. */
+#define ASCC_MAX_HISTORY 8
+
 #endif

@@ -15,7 +15,8 @@
 #define COUNT(list) ((int32_t)(sizeof(list) / sizeof *(list)))
 
 static const char *const evaluations[] = {"current", "advected", "advected_mean"};
-static const char *const features[] = {"one", "velocity", "normal", "motion", "gravity", "area"};
+static const char *const features[] = {"one",     "velocity", "normal", "motion",
+                                       "gravity", "area",     "history"};
 static const char *const samplings[] = {"voxel_centers", "voxel_corners", "farthest"};
 static const char *const sampled[] = {"all", "fluid"};
 static const char *const anchors[] = {"world", "centroid"};
@@ -171,6 +172,8 @@ static void read_head(ascc_plan_builder *builder, ascc_reader *reader)
         plan->boundary_crop =
             ascc_reader_number(reader, 0, "boundary_crop", ASCC_PLAN_MIN, ASCC_PLAN_MAX);
 
+    if (ascc_reader_has(reader, 0, "history"))
+        plan->history = ascc_reader_integer(reader, 0, "history", 1, ASCC_MAX_HISTORY);
     const uint32_t object = ascc_reader_object(reader, 0, "features");
     ascc_reader_where(reader, "network 'features'");
     read_features(reader, object, "fluid", plan->fluid_features, &plan->fluid_feature_count);

@@ -163,6 +163,7 @@ typedef enum ascc_feature {
     ASCC_FEATURE_MOTION,   /* velocity in spacings a time step; walls 0; dimension channels */
     ASCC_FEATURE_GRAVITY, /* fluid: the step's, in spacings a squared time step; dimension channels */
     ASCC_FEATURE_AREA,    /* boundary: what a point stands for, in spacings^(dimension - 1) */
+    ASCC_FEATURE_HISTORY, /* fluid: velocities before the last steps, as motion; `dimension` channels each */
 } ascc_feature;
 
 typedef enum ascc_sampling {
@@ -193,6 +194,7 @@ typedef struct ascc_plan {
     double time_step_min, time_step_max, gravity_min, gravity_max, way_max;
     int32_t fluid_features[ASCC_MAX_FEATURES], fluid_feature_count, fluid_channels;
     int32_t boundary_features[ASCC_MAX_FEATURES], boundary_feature_count, boundary_channels;
+    int32_t history;      /* velocities of earlier steps that the feature has; 0 = there is none */
     double boundary_crop; /* m: walls farther than this from the fluid's bounding box are left out;
                              <= 0: none are */
     int32_t level_count;
@@ -243,9 +245,11 @@ static inline size_t ascc_padded(int32_t channels)
     return ((size_t)channels + 7) / 8 * 8;
 }
 
-static inline int32_t ascc_feature_channels(int32_t feature, int32_t dimension)
+static inline int32_t ascc_feature_channels(const ascc_plan *plan, int32_t feature)
 {
-    return feature == ASCC_FEATURE_ONE || feature == ASCC_FEATURE_AREA ? 1 : dimension;
+    return feature == ASCC_FEATURE_ONE || feature == ASCC_FEATURE_AREA ? 1
+           : feature == ASCC_FEATURE_HISTORY ? plan->history * plan->dimension
+                                             : plan->dimension;
 }
 
 /* First channel of a feature of value 0 (fluid) or 1 (boundary), -1 = it has none. */
@@ -257,7 +261,7 @@ static inline int32_t ascc_plan_feature(const ascc_plan *plan, int32_t value, as
     for (int32_t i = 0; i < count; i++) {
         if (feature[i] == (int32_t)wanted)
             return channel;
-        channel += ascc_feature_channels(feature[i], plan->dimension);
+        channel += ascc_feature_channels(plan, feature[i]);
     }
     return -1;
 }

@@ -89,13 +89,14 @@ static ascc_status check_features(ascc_plan_builder *builder, const char *whose,
     for (int32_t i = 0; i < count; i++) {
         if (feature[i] != ASCC_FEATURE_ONE && feature[i] != ASCC_FEATURE_MOTION &&
             feature[i] != (int32_t)vector &&
-            !(feature[i] == ASCC_FEATURE_GRAVITY && vector == ASCC_FEATURE_VELOCITY) &&
+            !((feature[i] == ASCC_FEATURE_GRAVITY || feature[i] == ASCC_FEATURE_HISTORY) &&
+              vector == ASCC_FEATURE_VELOCITY) &&
             !(feature[i] == ASCC_FEATURE_AREA && vector == ASCC_FEATURE_NORMAL))
             return FAIL("a feature that the %s does not have", whose);
         for (int32_t j = 0; j < i; j++)
             if (feature[i] == feature[j])
                 return FAIL("a feature of the %s is given twice", whose);
-        *channels += ascc_feature_channels(feature[i], builder->plan.dimension);
+        *channels += ascc_feature_channels(&builder->plan, feature[i]);
     }
     return ASCC_OK;
 }
@@ -140,6 +141,10 @@ ascc_status ascc_plan_begin(ascc_plan_builder *builder)
         status = check_features(builder, "boundary", plan->boundary_features,
                                 plan->boundary_feature_count, ASCC_FEATURE_NORMAL,
                                 &plan->boundary_channels);
+    const bool reads = ascc_plan_feature(plan, 0, ASCC_FEATURE_HISTORY) >= 0;
+    if (status == ASCC_OK && reads != (plan->history > 0))
+        return FAIL("'history' is %d, but the fluid has %s feature 'history'", (int)plan->history,
+                    reads ? "a" : "no");
     return status == ASCC_OK ? check_levels(builder) : status;
 }
 

@@ -12,8 +12,8 @@
 #include "reverse.h"
 
 enum { TENSOR_SCALE = 0, TENSOR_OFFSET = 1 };
-#define LANES 8
-#define SMALL 1e-5f /* added to variances */
+#define PARTS 8
+#define LEAST_VARIANCE 1e-5f /* added to variances */
 
 static void read_normalize(ascc_reader *reader, uint32_t object, const ascc_plan *plan,
                            ascc_term *term, const char *name[ASCC_MAX_TENSORS])
@@ -80,7 +80,7 @@ static double cost(const ascc_plan *plan, const ascc_cost_counts *counts, int32_
     return 3.0 * term->inputs * ascc_cost_points(counts, set);
 }
 
-static float total(const float sum[LANES])
+static float total(const float sum[PARTS])
 {
     return ((sum[0] + sum[4]) + (sum[2] + sum[6])) + ((sum[1] + sum[5]) + (sum[3] + sum[7]));
 }
@@ -88,20 +88,20 @@ static float total(const float sum[LANES])
 /* x[count], filled up with zeros, becomes y: less its mean, over its deviation; returns 1 / the latter. */
 static float standardize(const float *restrict x, size_t count, size_t padded, float *restrict y)
 {
-    float sum[LANES] = {0.0f}, square[LANES] = {0.0f};
-    for (size_t c = 0; c < padded; c += LANES)
-        for (size_t n = 0; n < LANES; n++)
+    float sum[PARTS] = {0.0f}, square[PARTS] = {0.0f};
+    for (size_t c = 0; c < padded; c += PARTS)
+        for (size_t n = 0; n < PARTS; n++)
             sum[n] += x[c + n];
     const float mean = total(sum) / (float)count;
-    for (size_t c = 0; c < padded; c += LANES)
-        for (size_t n = 0; n < LANES; n++)
+    for (size_t c = 0; c < padded; c += PARTS)
+        for (size_t n = 0; n < PARTS; n++)
             y[c + n] = x[c + n] - mean;
     for (size_t c = count; c < padded; c++)
         y[c] = 0.0f;
-    for (size_t c = 0; c < padded; c += LANES)
-        for (size_t n = 0; n < LANES; n++)
+    for (size_t c = 0; c < padded; c += PARTS)
+        for (size_t n = 0; n < PARTS; n++)
             square[n] += y[c + n] * y[c + n];
-    const float inverse = 1.0f / sqrtf(total(square) / (float)count + SMALL);
+    const float inverse = 1.0f / sqrtf(total(square) / (float)count + LEAST_VARIANCE);
     for (size_t c = 0; c < padded; c++)
         y[c] *= inverse;
     return inverse;
@@ -133,10 +133,10 @@ static void back_row(const ascc_reverse *pass, const ascc_term *term, const floa
     const size_t count = (size_t)term->inputs, a = ascc_padded(term->inputs);
     const float *scale = ascc_term_packed(pass->run, term);
     float *by_scale = ascc_reverse_packed(pass, term), *by_offset = by_scale + a;
-    float y[ASCC_MAX_CHANNELS], by_y[ASCC_MAX_CHANNELS], sum[LANES] = {0.0f}, dot[LANES] = {0.0f};
+    float y[ASCC_MAX_CHANNELS], by_y[ASCC_MAX_CHANNELS], sum[PARTS] = {0.0f}, dot[PARTS] = {0.0f};
     const float inverse = standardize(x, count, a, y);
-    for (size_t c = 0; c < a; c += LANES)
-        for (size_t n = 0; n < LANES; n++) {
+    for (size_t c = 0; c < a; c += PARTS)
+        for (size_t n = 0; n < PARTS; n++) {
             by_scale[c + n] += g[c + n] * y[c + n];
             by_offset[c + n] += g[c + n];
             by_y[c + n] = g[c + n] * scale[c + n];

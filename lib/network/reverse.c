@@ -187,16 +187,22 @@ static void add_velocities(const ascc_reverse *p)
     const size_t d = (size_t)plan->dimension;
     const double motion = plan->time_step / plan->spacing;
     for (size_t i = 0; i < h->set[ASCC_SET_FLUID].count; i++) {
-        double *to = p->pass->velocity + h->origin[h->whole[ASCC_SET_FLUID][i]] * d;
-        float channel[ASCC_MAX_FEATURES * 3], *g = channel;
+        const size_t row = h->origin[h->whole[ASCC_SET_FLUID][i]];
+        double *to = p->pass->velocity + row * d;
+        float channel[(ASCC_MAX_FEATURES + ASCC_MAX_HISTORY) * 3], *g = channel;
         join_row(p, 0, i, (size_t)plan->fluid_channels, channel);
         for (int32_t f = 0; f < plan->fluid_feature_count; f++) {
             const int32_t feature = plan->fluid_features[f];
             const double factor = feature == ASCC_FEATURE_MOTION ? motion : 1.0;
-            const bool moves = feature != ASCC_FEATURE_ONE && feature != ASCC_FEATURE_GRAVITY;
+            const bool moves = feature != ASCC_FEATURE_ONE && feature != ASCC_FEATURE_GRAVITY &&
+                               feature != ASCC_FEATURE_HISTORY;
+            const size_t channels = (size_t)ascc_feature_channels(plan, feature);
+            double *past = p->pass->past ? p->pass->past + row * channels : NULL;
+            for (size_t c = 0; feature == ASCC_FEATURE_HISTORY && past && c < channels; c++)
+                past[c] += motion * (double)g[c];
             for (size_t c = 0; moves && c < d; c++)
                 to[c] += factor * (double)g[c];
-            g += ascc_feature_channels(feature, plan->dimension);
+            g += channels;
         }
     }
 }

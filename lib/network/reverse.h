@@ -33,6 +33,7 @@ typedef struct ascc_backward {
     const double *guess;      /* [host's fluid rows] of what pressures begin with; or NULL */
     float *packed;            /* += gradient of the packed weights */
     double *velocity;         /* += gradient of the velocities seen, per m/s; or NULL */
+    double *past; /* += gradient of earlier velocities, [fluid][history][dimension]; or NULL */
     double *seen, *place; /* += gradient of positions seen and before the step, per m; or NULL */
 } ascc_backward;
 

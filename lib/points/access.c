@@ -19,7 +19,8 @@ ascc_status ascc_field_check(const ascc_particles *particles, ascc_field_index f
     double values[3];
     ascc_candidate row = {.name = from->name,
                           .values = values,
-                          .numbers = ascc_field_numbers(what, particles->dimension),
+                          .numbers =
+                              ascc_field_numbers(what, particles->dimension, particles->past_count),
                           .spacing = particles->spacing};
     for (row.row = 0; row.row < count; row.row++) {
         for (int32_t c = 0; c < row.numbers; c++)
@@ -35,7 +36,7 @@ void ascc_field_store(ascc_particles *particles, ascc_field_index field,
                       const ascc_host_array *from, size_t first, size_t count)
 {
     const ascc_particle_field *const what = &ascc_particle_fields[field];
-    const int32_t numbers = ascc_field_numbers(what, particles->dimension);
+    const int32_t numbers = ascc_field_numbers(what, particles->dimension, particles->past_count);
     double *const into = (double *)ascc_field_rows(particles, what) + first * (size_t)numbers;
     for (size_t row = 0; row < count; row++)
         for (int32_t c = 0; c < numbers; c++)
@@ -88,6 +89,8 @@ static ascc_status set_field(ascc_particles *particles, ascc_field_index field, 
         status = ascc_velocity_check(particles, from, &mass, count, message);
         if (status == ASCC_OK)
             ascc_velocity_store(particles, from, first, count);
+        if (status == ASCC_OK)
+            ascc_particles_fill_past(particles, first, count, 0);
     } else if (field == ASCC_FIELD_mass) {
         status = ascc_new_mass_check(particles, from, first, count, message);
         if (status == ASCC_OK)
@@ -111,10 +114,11 @@ ascc_status ascc_particles_set(ascc_particles *particles, ascc_kind kind, ascc_f
     ascc_host_array from;
     ascc_status status = check_field(particles, kind, field, first, count, &which, &message);
     if (status == ASCC_OK && count > 0)
-        status = ascc_host_array_open(
-            "values", values,
-            ascc_field_numbers(&ascc_particle_fields[which], particles->dimension), &from,
-            &message);
+        status =
+            ascc_host_array_open("values", values,
+                                 ascc_field_numbers(&ascc_particle_fields[which],
+                                                    particles->dimension, particles->past_count),
+                                 &from, &message);
     if (status == ASCC_OK && kind == ASCC_BOUNDARY)
         status = ascc_bodies_check_free(particles, first, count, &message);
     if (status == ASCC_OK && count > 0) {
@@ -136,7 +140,8 @@ static double field_value(const ascc_particles *particles, ascc_field_index fiel
     const ascc_particle_field *const what = &ascc_particle_fields[field];
     if (field == ASCC_FIELD_momentum)
         return ascc_velocity(particles, row, c);
-    const size_t numbers = (size_t)ascc_field_numbers(what, particles->dimension);
+    const size_t numbers =
+        (size_t)ascc_field_numbers(what, particles->dimension, particles->past_count);
     return ((const double *)ascc_field_rows(particles, what))[row * numbers + (size_t)c];
 }
 
@@ -157,7 +162,8 @@ ascc_status ascc_particles_get(const ascc_particles *particles, ascc_kind kind, 
     ascc_host_array opened;
     int32_t numbers = 0;
     if (status == ASCC_OK) {
-        numbers = ascc_field_numbers(&ascc_particle_fields[which], particles->dimension);
+        numbers = ascc_field_numbers(&ascc_particle_fields[which], particles->dimension,
+                                     particles->past_count);
         status = ascc_host_array_open("values", &described, numbers, &opened, &message);
     }
     if (status != ASCC_OK)
@@ -183,7 +189,7 @@ static ascc_status get_held(const ascc_particles *particles, ascc_kind kind, asc
     if (status != ASCC_OK)
         return ascc_particles_fail_reading(particles, status, "%s", message.text);
     const ascc_particle_field *const what = &ascc_particle_fields[field];
-    const size_t size = ascc_field_row_size(what, particles->dimension);
+    const size_t size = ascc_field_row_size(what, particles->dimension, particles->past_count);
     if (count > 0)
         memcpy(into, (const unsigned char *)ascc_field_rows(particles, what) + first * size,
                count * size);

@@ -94,6 +94,16 @@ static ascc_status check_velocity(const ascc_candidate *row, ascc_message *messa
     return ASCC_OK;
 }
 
+static ascc_status check_past(const ascc_candidate *row, ascc_message *message)
+{
+    const double *const past = row->values;
+    for (int32_t c = 0; c < row->numbers; c++)
+        if (!isfinite(past[c]))
+            return ascc_fail_number(message, ASCC_ERROR_NOT_FINITE, row->name, row->row, c, past[c],
+                                    "");
+    return ASCC_OK;
+}
+
 static ascc_status check_body(const ascc_candidate *row, ascc_message *message)
 {
     const int32_t *const body = row->values;
@@ -105,8 +115,9 @@ static ascc_status check_body(const ascc_candidate *row, ascc_message *message)
 
 /* ---- Table ----------------------------------------------------------------------------------- */
 
-#define VECTOR true
-#define SCALAR false
+#define VECTOR ASCC_WIDTH_VECTOR
+#define SCALAR ASCC_WIDTH_SCALAR
+#define PAST ASCC_WIDTH_PAST
 #define HASHED ASCC_HASH_ALWAYS
 #define UNHASHED ASCC_HASH_NEVER
 #define NONZERO ASCC_HASH_NONZERO

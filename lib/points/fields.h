@@ -11,7 +11,7 @@
  *   kind     of particle that has it
  *   member   of struct ascc_particles: a pointer to the first row
  *   type     of a number: double, int64_t, uint64_t or int32_t
- *   numbers  of a row: VECTOR (`dimension`) or SCALAR (one)
+ *   numbers  of a row: VECTOR (`dimension`), SCALAR (one) or PAST (a vector for each earlier step that the set keeps)
  *   hash     HASHED, or UNHASHED: what depends on the order of rows or on the past; NONZERO: rows of zeros are
  *            left out, so that hashes taken before there was the field stay what they were
  *   access   what ascc_particles_set and ascc_particles_get call it, or PRIVATE
@@ -35,7 +35,8 @@
     /* In the frame of a body (bodies.h); zeros where there is none. */                            \
     X(ASCC_BOUNDARY, wall_own_position, double, VECTOR, UNHASHED, PRIVATE, check_position)         \
     X(ASCC_BOUNDARY, wall_own_normal, double, VECTOR, UNHASHED, PRIVATE, check_own_normal)         \
-    X(ASCC_FLUID, rest, int32_t, SCALAR, NONZERO, PRIVATE, NULL) /* rest.h */
+    X(ASCC_FLUID, rest, int32_t, SCALAR, NONZERO, PRIVATE, NULL)     /* rest.h */                  \
+    X(ASCC_FLUID, past, double, PAST, UNHASHED, PRIVATE, check_past) /* the last step's first */
 
 /* Raise it with every change of the list. */
 #define ASCC_SNAPSHOT_VERSION 4
@@ -61,6 +62,9 @@ static inline size_t ascc_snapshot_fields(uint64_t version)
 /* What a number is; all but the last take eight bytes. */
 typedef enum ascc_element { ASCC_REAL, ASCC_INTEGER, ASCC_SMALL_INTEGER } ascc_element;
 
+/* Of a row's numbers. */
+typedef enum ascc_width { ASCC_WIDTH_SCALAR, ASCC_WIDTH_VECTOR, ASCC_WIDTH_PAST } ascc_width;
+
 /* Whether the hash sees a row: never, always, or where it is not zero. */
 typedef enum ascc_hashing { ASCC_HASH_NEVER, ASCC_HASH_ALWAYS, ASCC_HASH_NONZERO } ascc_hashing;
 
@@ -79,7 +83,7 @@ typedef struct ascc_particle_field {
     const char *name;
     ascc_kind kind;
     ascc_element element;
-    bool vector;
+    ascc_width width;
     ascc_hashing hash;
     int32_t access; /* an ascc_field, or negative */
     size_t offset;  /* of the pointer in struct ascc_particles */
@@ -93,16 +97,20 @@ static inline size_t ascc_field_element_size(const ascc_particle_field *field)
     return field->element == ASCC_SMALL_INTEGER ? sizeof(int32_t) : sizeof(int64_t);
 }
 
-/* Numbers of a row. */
-static inline int32_t ascc_field_numbers(const ascc_particle_field *field, int32_t dimension)
+/* Numbers of a row; past: the earlier steps that the set keeps. */
+static inline int32_t ascc_field_numbers(const ascc_particle_field *field, int32_t dimension,
+                                         int32_t past)
 {
-    return field->vector ? dimension : 1;
+    return field->width == ASCC_WIDTH_SCALAR   ? 1
+           : field->width == ASCC_WIDTH_VECTOR ? dimension
+                                               : past * dimension;
 }
 
 /* Bytes of a row. */
-static inline size_t ascc_field_row_size(const ascc_particle_field *field, int32_t dimension)
+static inline size_t ascc_field_row_size(const ascc_particle_field *field, int32_t dimension,
+                                         int32_t past)
 {
-    return (size_t)ascc_field_numbers(field, dimension) * ascc_field_element_size(field);
+    return (size_t)ascc_field_numbers(field, dimension, past) * ascc_field_element_size(field);
 }
 
 /* The first row. */

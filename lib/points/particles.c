@@ -270,6 +270,7 @@ static ascc_status add_fluid(ascc_particles *particles, size_t count,
     ascc_field_store(particles, ASCC_FIELD_position, &from.position, first, count);
     ascc_field_store(particles, ASCC_FIELD_mass, &from.mass, first, count);
     ascc_velocity_store(particles, &from.velocity, first, count);
+    ascc_particles_fill_past(particles, first, count, 0);
     give_ids(particles, particles->id, first, count, ids);
     particles->fluid_count += count;
     ascc_rest_disturb(particles, ASCC_FLUID, first, count);

@@ -20,6 +20,8 @@ struct ascc_particles {
     double default_mass;
     double quantum;   /* momentum of one unit, kg length/s */
     uint64_t next_id; /* at most ASCC_ID_LIMIT */
+    int32_t
+        past_count; /* velocities of earlier steps that each fluid particle has, besides its own */
 
     /* Rows in order of addition (ids ascend). Vectors are [count][dimension]. The arrays of a kind
      * lie in one block of memory that begins with the first: none is replaced alone. */
@@ -101,6 +103,13 @@ ascc_status ascc_particles_append_walls(ascc_particles *particles, size_t count,
 
 /* Makes room for exactly these counts where there is less. False and unchanged without memory. */
 bool ascc_particles_make_room(ascc_particles *particles, size_t fluid, size_t boundary);
+
+/* The same, and makes the set keep this many earlier velocities; where it kept fewer, particles have moved before
+ * as they did at first. */
+bool ascc_particles_arrange(ascc_particles *particles, size_t fluid, size_t boundary, int32_t past);
+
+/* Earlier velocities of rows from the age `known` on become the one before: the particle's own before all. */
+void ascc_particles_fill_past(ascc_particles *particles, size_t first, size_t count, int32_t known);
 
 /* Whether that many rows of a kind can be in any memory. */
 bool ascc_particles_can_hold(const ascc_particles *particles, ascc_kind kind, size_t rows);

@@ -11,7 +11,7 @@
 /*
  * A row of 64-bit words, little-endian on every machine; floats are their IEEE bits:
  *
- *   magic, version, dimension, fluid count, boundary count, next id, spacing, mass, quantum,
+ *   magic, version and (from bit 32 on) earlier velocities of each particle, dimension, fluid count, boundary count, next id, spacing, mass, quantum,
  *   every field of the list in fields.h that the version has, row by row,
  *   from version 3 on every body (number, whether it moved, first id, end of ids, its doubles in the order of
  *   bodies.h), the next body's number, the number of bodies,
@@ -19,17 +19,18 @@
  */
 #define SNAPSHOT_MAGIC UINT64_C(0x50414e5343435341) /* the bytes "ASCCSNAP" */
 #define SNAPSHOT_HEADER 9
+#define PAST_SHIFT 32
 #define SNAPSHOT_FRAME (SNAPSHOT_HEADER + 1) /* and the checksum */
 #define BODY_WORDS (4 + ASCC_BODY_NUMBERS)
 #define BODIES_FRAME 2 /* after the bodies, from version 3 on */
 
 /* Words of one particle of a kind, in a snapshot with the first `fields` of the list. */
-static size_t row_words(ascc_kind kind, int32_t dimension, size_t fields)
+static size_t row_words(ascc_kind kind, int32_t dimension, int32_t past, size_t fields)
 {
     size_t words = 0;
     for (size_t i = 0; i < fields; i++)
         if (ascc_particle_fields[i].kind == kind)
-            words += (size_t)ascc_field_numbers(&ascc_particle_fields[i], dimension);
+            words += (size_t)ascc_field_numbers(&ascc_particle_fields[i], dimension, past);
     return words;
 }
 
@@ -74,10 +75,10 @@ static uint64_t checksum(const unsigned char *bytes, size_t words)
 
 static size_t snapshot_words(const ascc_particles *particles)
 {
-    const int32_t dimension = particles->dimension;
+    const int32_t dimension = particles->dimension, past = particles->past_count;
     return SNAPSHOT_FRAME +
-           particles->fluid_count * row_words(ASCC_FLUID, dimension, ASCC_FIELD_COUNT) +
-           particles->boundary_count * row_words(ASCC_BOUNDARY, dimension, ASCC_FIELD_COUNT) +
+           particles->fluid_count * row_words(ASCC_FLUID, dimension, past, ASCC_FIELD_COUNT) +
+           particles->boundary_count * row_words(ASCC_BOUNDARY, dimension, past, ASCC_FIELD_COUNT) +
            particles->body_count * BODY_WORDS + BODIES_FRAME;
 }
 
@@ -148,7 +149,7 @@ ascc_status ascc_particles_snapshot(const ascc_particles *particles, void *memor
                                            capacity, size);
     unsigned char *at = memory;
     at = put(at, SNAPSHOT_MAGIC);
-    at = put(at, ASCC_SNAPSHOT_VERSION);
+    at = put(at, ASCC_SNAPSHOT_VERSION | (uint64_t)particles->past_count << PAST_SHIFT);
     at = put(at, ascc_particles_width(particles));
     at = put(at, particles->fluid_count);
     at = put(at, particles->boundary_count);
@@ -159,8 +160,9 @@ ascc_status ascc_particles_snapshot(const ascc_particles *particles, void *memor
     for (size_t i = 0; i < ASCC_FIELD_COUNT; i++) {
         const ascc_particle_field *const field = &ascc_particle_fields[i];
         const unsigned char *const numbers = ascc_field_rows(particles, field);
-        const size_t count = ascc_particles_count(particles, field->kind) *
-                             (size_t)ascc_field_numbers(field, particles->dimension);
+        const size_t count =
+            ascc_particles_count(particles, field->kind) *
+            (size_t)ascc_field_numbers(field, particles->dimension, particles->past_count);
         for (size_t k = 0; k < count; k++)
             at = put(at, number_word(field, numbers, k));
     }
@@ -177,6 +179,7 @@ ascc_status ascc_particles_snapshot(const ascc_particles *particles, void *memor
 /* A snapshot taken apart. */
 typedef struct snapshot {
     int32_t dimension;
+    int32_t past;
     size_t fields; /* of the list */
     size_t rows[ASCC_KIND_COUNT];
     uint64_t next_id;
@@ -194,8 +197,9 @@ static bool open_snapshot(const unsigned char *bytes, size_t size, snapshot *fro
     if (size < 8 * SNAPSHOT_FRAME || size % 8 != 0 || get_word(bytes) != SNAPSHOT_MAGIC)
         return false;
     *why = "of a version not known here";
-    const size_t fields = ascc_snapshot_fields(get_word(bytes + 8));
-    if (fields == 0)
+    const uint64_t version = get_word(bytes + 8), past = version >> PAST_SHIFT;
+    const size_t fields = ascc_snapshot_fields(version & UINT32_MAX);
+    if (fields == 0 || past > (fields == ASCC_FIELD_COUNT ? ASCC_MAX_HISTORY : 0))
         return false;
     *why = "damaged: its checksum is wrong";
     if (get_word(bytes + size - 8) != checksum(bytes, size / 8 - 1))
@@ -219,13 +223,15 @@ static bool open_snapshot(const unsigned char *bytes, size_t size, snapshot *fro
             return false;
         words -= (size_t)bodies * BODY_WORDS;
     }
-    const size_t fluid_words = row_words(ASCC_FLUID, (int32_t)dimension, fields);
-    const size_t boundary_words = row_words(ASCC_BOUNDARY, (int32_t)dimension, fields);
+    const size_t fluid_words = row_words(ASCC_FLUID, (int32_t)dimension, (int32_t)past, fields);
+    const size_t boundary_words =
+        row_words(ASCC_BOUNDARY, (int32_t)dimension, (int32_t)past, fields);
     if (fluid > words / fluid_words || boundary > words / boundary_words ||
         (size_t)fluid * fluid_words + (size_t)boundary * boundary_words != words)
         return false;
 
     *from = (snapshot){.dimension = (int32_t)dimension,
+                       .past = (int32_t)past,
                        .fields = fields,
                        .rows = {(size_t)fluid, (size_t)boundary},
                        .next_id = get_word(bytes + 40),
@@ -239,7 +245,8 @@ static bool open_snapshot(const unsigned char *bytes, size_t size, snapshot *fro
     for (size_t i = 0; i < fields; i++) {
         const ascc_particle_field *const field = &ascc_particle_fields[i];
         from->words[i] = at;
-        at += 8 * from->rows[field->kind] * (size_t)ascc_field_numbers(field, from->dimension);
+        at += 8 * from->rows[field->kind] *
+              (size_t)ascc_field_numbers(field, from->dimension, from->past);
     }
     return true;
 }
@@ -249,13 +256,13 @@ static ascc_status check_field(const snapshot *from, size_t index, ascc_message 
 {
     const ascc_particle_field *const field = &ascc_particle_fields[index];
     union {
-        double real[3];
+        double real[3 * ASCC_MAX_HISTORY];
         int64_t integer[3];
         int32_t small[3];
     } values;
     ascc_candidate row = {.name = field->name,
                           .values = &values,
-                          .numbers = ascc_field_numbers(field, from->dimension),
+                          .numbers = ascc_field_numbers(field, from->dimension, from->past),
                           .spacing = from->spacing};
     const unsigned char *at = from->words[index];
     for (row.row = 0; row.row < from->rows[field->kind]; row.row++) {
@@ -430,8 +437,8 @@ static void become(ascc_particles *particles, const snapshot *from)
     for (size_t i = 0; i < from->fields; i++) {
         const ascc_particle_field *const field = &ascc_particle_fields[i];
         unsigned char *const numbers = ascc_field_rows(particles, field);
-        const size_t count =
-            from->rows[field->kind] * (size_t)ascc_field_numbers(field, from->dimension);
+        const size_t count = from->rows[field->kind] *
+                             (size_t)ascc_field_numbers(field, from->dimension, from->past);
         for (size_t k = 0; k < count; k++)
             (void)number_from_word(field, numbers, k, get_word(from->words[i] + 8 * k));
     }
@@ -462,7 +469,7 @@ ascc_status ascc_particles_restore(ascc_particles *particles, const void *memory
                    &particles->body_capacity, from.body_count, sizeof *particles->bodies))
         return ascc_particles_fail(particles, ASCC_ERROR_MEMORY, "out of memory for %zu bodies",
                                    from.body_count);
-    if (!ascc_particles_make_room(particles, fluid, boundary))
+    if (!ascc_particles_arrange(particles, fluid, boundary, from.past))
         return ascc_particles_fail(particles, ASCC_ERROR_MEMORY,
                                    "out of memory for %zu fluid and %zu boundary particles", fluid,
                                    boundary);
@@ -506,8 +513,9 @@ static uint64_t sum_rows(const ascc_particles *particles, ascc_kind kind)
         for (size_t i = 0; i < ASCC_FIELD_COUNT; i++) {
             const ascc_particle_field *const field = &ascc_particle_fields[i];
             if (field->kind == kind && field->hash != ASCC_HASH_NEVER)
-                one = mix_row(one, field, ascc_field_rows(particles, field), row,
-                              (size_t)ascc_field_numbers(field, particles->dimension));
+                one = mix_row(
+                    one, field, ascc_field_rows(particles, field), row,
+                    (size_t)ascc_field_numbers(field, particles->dimension, particles->past_count));
         }
         sum += one;
     }

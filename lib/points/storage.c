@@ -4,7 +4,7 @@
  * The fields of a kind lie in one block of memory, so growing them is one allocation that succeeds
  * or fails as a whole:
  *
- *     fluid     | position | momentum | mass | id | rest |
+ *     fluid     | position | momentum | mass | id | rest | past |
  *     boundary  | position | normal   | impulse | id | body | velocity | own position | own normal |
  */
 #include <string.h>
@@ -21,12 +21,16 @@ static size_t *capacity_of(ascc_particles *particles, int kind)
     return kind == ASCC_FLUID ? &particles->fluid_capacity : &particles->boundary_capacity;
 }
 
-/* Bytes of a field in a block for that many rows; false when no memory can hold them. */
-static bool field_size(const ascc_particle_field *field, int32_t dimension, size_t rows,
-                       size_t *size)
+static size_t row_size(const ascc_particles *particles, const ascc_particle_field *field)
 {
-    if (!ascc_multiply_size(rows, ascc_field_row_size(field, dimension), size) ||
-        *size > PTRDIFF_MAX / 8)
+    return ascc_field_row_size(field, particles->dimension, particles->past_count);
+}
+
+/* Bytes of a field in a block for that many rows; false when no memory can hold them. */
+static bool field_size(const ascc_particles *particles, const ascc_particle_field *field,
+                       size_t rows, size_t *size)
+{
+    if (!ascc_multiply_size(rows, row_size(particles, field), size) || *size > PTRDIFF_MAX / 8)
         return false;
     *size = (*size + ASCC_ALIGNMENT - 1) / ASCC_ALIGNMENT * ASCC_ALIGNMENT;
     return true;
@@ -40,7 +44,7 @@ static size_t block_size(const ascc_particles *particles, int kind, size_t rows)
         const ascc_particle_field *const field = &ascc_particle_fields[i];
         if ((int)field->kind != kind)
             continue;
-        if (!field_size(field, particles->dimension, rows, &size) || size > PTRDIFF_MAX - sum)
+        if (!field_size(particles, field, rows, &size) || size > PTRDIFF_MAX - sum)
             return SIZE_MAX;
         sum += size;
     }
@@ -55,7 +59,7 @@ static void place(ascc_particles *particles, int kind, unsigned char *block, siz
         size_t size = 0;
         if ((int)field->kind != kind)
             continue;
-        (void)field_size(field, particles->dimension, rows, &size);
+        (void)field_size(particles, field, rows, &size);
         ascc_field_point(particles, field, block);
         block += size;
     }
@@ -67,10 +71,33 @@ static void copy_rows(ascc_particles *into, ascc_particles *from, int kind)
     const size_t rows = *count_of(from, kind);
     for (size_t i = 0; i < ASCC_FIELD_COUNT; i++) {
         const ascc_particle_field *const field = &ascc_particle_fields[i];
-        if ((int)field->kind == kind && rows > 0)
+        const bool same = field->width != ASCC_WIDTH_PAST || into->past_count == from->past_count;
+        if ((int)field->kind == kind && rows > 0 && same)
             memcpy(ascc_field_rows(into, field), ascc_field_rows(from, field),
-                   rows * ascc_field_row_size(field, from->dimension));
+                   rows * row_size(into, field));
     }
+}
+
+void ascc_particles_fill_past(ascc_particles *particles, size_t first, size_t count, int32_t known)
+{
+    const size_t d = ascc_particles_width(particles), past = (size_t)particles->past_count;
+    for (size_t row = first; row < first + count; row++)
+        for (size_t age = (size_t)known; age < past; age++)
+            for (size_t c = 0; c < d; c++) {
+                double *const at = particles->past + (row * past + age) * d + c;
+                const double own = ascc_velocity(particles, row, (int32_t)c);
+                *at = age ? *(at - d) : isfinite(own) ? own : 0.0; /* a step refuses the latter */
+            }
+}
+
+/* Where one set keeps more of the past than the other: what both have, and the oldest again and again. */
+static void copy_past(ascc_particles *into, const ascc_particles *from)
+{
+    const size_t d = ascc_particles_width(into), to = (size_t)into->past_count;
+    const size_t has = (size_t)from->past_count, known = ascc_min_size(has, to);
+    for (size_t row = 0; row < from->fluid_count && known > 0; row++)
+        memcpy(into->past + row * to * d, from->past + row * has * d, known * d * sizeof(double));
+    ascc_particles_fill_past(into, 0, from->fluid_count, (int32_t)known);
 }
 
 /* A block begins with the first field of its kind. */
@@ -101,15 +128,24 @@ bool ascc_particles_can_hold(const ascc_particles *particles, ascc_kind kind, si
 
 bool ascc_particles_make_room(ascc_particles *particles, size_t fluid, size_t boundary)
 {
-    const size_t rows[ASCC_KIND_COUNT] = {fluid, boundary};
+    return ascc_particles_arrange(particles, fluid, boundary, particles->past_count);
+}
+
+bool ascc_particles_arrange(ascc_particles *particles, size_t fluid, size_t boundary, int32_t past)
+{
+    const bool same = past == particles->past_count;
+    const size_t rows[ASCC_KIND_COUNT] = {
+        same ? fluid : ascc_max_size(fluid, particles->fluid_capacity), boundary};
     bool grows[ASCC_KIND_COUNT];
     ascc_particles grown = *particles;
+    grown.past_count = past;
     for (int kind = 0; kind < ASCC_KIND_COUNT; kind++) {
-        grows[kind] = rows[kind] > *capacity_of(particles, kind);
+        grows[kind] = rows[kind] > *capacity_of(particles, kind) ||
+                      (kind == ASCC_FLUID && !same && rows[kind] > 0);
         if (!grows[kind])
             continue;
-        unsigned char *const block = ascc_allocate(&particles->context->allocator, 1,
-                                                   block_size(particles, kind, rows[kind]));
+        unsigned char *const block =
+            ascc_allocate(&particles->context->allocator, 1, block_size(&grown, kind, rows[kind]));
         if (block == NULL) {
             if (kind == ASCC_BOUNDARY && grows[ASCC_FLUID])
                 release_rows(&grown, ASCC_FLUID);
@@ -121,6 +157,8 @@ bool ascc_particles_make_room(ascc_particles *particles, size_t fluid, size_t bo
         if (!grows[kind])
             continue;
         copy_rows(&grown, particles, kind);
+        if (kind == ASCC_FLUID && !same)
+            copy_past(&grown, particles);
         release_rows(particles, kind);
     }
     *particles = grown;
@@ -131,7 +169,7 @@ void ascc_particles_zero_rows(ascc_particles *particles, ascc_kind kind, size_t 
 {
     for (size_t i = 0; i < ASCC_FIELD_COUNT; i++) {
         const ascc_particle_field *const field = &ascc_particle_fields[i];
-        const size_t size = ascc_field_row_size(field, particles->dimension);
+        const size_t size = row_size(particles, field);
         if (field->kind == kind && count > 0)
             memset((unsigned char *)ascc_field_rows(particles, field) + first * size, 0,
                    count * size);
@@ -161,8 +199,8 @@ void ascc_particles_drop_rows(ascc_particles *particles, ascc_kind kind,
     for (size_t i = 0; i < ASCC_FIELD_COUNT; i++) {
         const ascc_particle_field *const field = &ascc_particle_fields[i];
         if (field->kind == kind)
-            kept = close_gaps(ascc_field_rows(particles, field),
-                              ascc_field_row_size(field, particles->dimension), *count, marked);
+            kept = close_gaps(ascc_field_rows(particles, field), row_size(particles, field), *count,
+                              marked);
     }
     *count = kept;
 }

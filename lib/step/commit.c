@@ -58,6 +58,16 @@ static ascc_status sum_walls(ascc_step_state *state)
     return ASCC_OK;
 }
 
+/* The velocity before the step is the first of the past. */
+static void add_past(ascc_particles *p, size_t row)
+{
+    const size_t d = (size_t)p->dimension, n = (size_t)p->past_count;
+    double *const past = p->past + row * n * d;
+    memmove(past + d, past, (n - 1) * d * sizeof *past);
+    for (size_t c = 0; c < d; c++)
+        past[c] = ascc_velocity(p, row, (int32_t)c);
+}
+
 typedef struct commit_job {
     ascc_particles *particles;
     const ascc_advance *advance;
@@ -68,6 +78,8 @@ static void commit_rows(void *data, size_t begin, size_t end, int32_t slot)
     (void)slot;
     const commit_job *job = data;
     const size_t d = (size_t)job->particles->dimension, n = (end - begin) * d;
+    for (size_t i = begin; job->particles->past_count && i < end; i++)
+        add_past(job->particles, i);
     memcpy(job->particles->position + begin * d, job->advance->position + begin * d,
            n * sizeof(double));
     memcpy(job->particles->momentum + begin * d, job->advance->momentum + begin * d,

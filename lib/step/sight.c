@@ -3,10 +3,10 @@
 #include "stage.h"
 
 /* vector: m/s of fluid, a normal of boundary, in units of `factor`; motion: the factor that makes of it
- * spacings a time step; gravity: in spacings a squared time step; area: of boundary. */
+ * spacings a time step; past: earlier velocities; gravity: in spacings a squared time step; area: of boundary. */
 static void features_of(const ascc_plan *plan, const int32_t *feature, int32_t feature_count,
-                        const double *vector, double factor, double motion, const double *gravity,
-                        double area, float *to)
+                        const double *vector, const double *past, double factor, double motion,
+                        const double *gravity, double area, float *to)
 {
     for (int32_t f = 0; f < feature_count; f++) {
         const double scale = feature[f] == ASCC_FEATURE_MOTION ? motion : factor;
@@ -14,6 +14,9 @@ static void features_of(const ascc_plan *plan, const int32_t *feature, int32_t f
             *to++ = 1.0f;
         else if (feature[f] == ASCC_FEATURE_AREA)
             *to++ = (float)area;
+        else if (feature[f] == ASCC_FEATURE_HISTORY)
+            for (int32_t c = 0; c < plan->history * plan->dimension; c++)
+                *to++ = (float)(past[c] * motion);
         else if (feature[f] == ASCC_FEATURE_GRAVITY)
             for (int32_t c = 0; c < plan->dimension; c++)
                 *to++ = (float)gravity[c];
@@ -54,14 +57,14 @@ static bool lend_features(ascc_step_state *state, const uint8_t *near)
         gravity[c] = state->motion->gravity[c] * plan->time_step * motion / state->time_unit;
     for (size_t i = 0; i < p->fluid_count; i++)
         features_of(plan, plan->fluid_features, plan->fluid_feature_count,
-                    state->advance.velocity + i * d, unit, motion, gravity, 0.0,
-                    state->fluid_features + i * fluid);
+                    state->advance.velocity + i * d, p->past + i * (size_t)p->past_count * d, unit,
+                    motion, gravity, 0.0, state->fluid_features + i * fluid);
     for (size_t i = 0; i < p->boundary_count; i++) {
         if (near && !near[i])
             continue;
         const double area = whole > 0.0 ? whole * (double)state->walls->volume[i] : 1.0;
         features_of(plan, plan->boundary_features, plan->boundary_feature_count,
-                    p->wall_normal + i * d, area, 0.0, gravity, area,
+                    p->wall_normal + i * d, NULL, area, 0.0, gravity, area,
                     state->boundary_features + i * wall);
     }
     return true;

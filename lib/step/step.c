@@ -203,6 +203,16 @@ static bool all_sleeps(const ascc_step_state *state)
     return state->sleep.count > 0 && state->sleep.count == state->particles->fluid_count;
 }
 
+/* Makes the set keep as many velocities as the model reads; that changes nothing that anyone can tell. */
+static ascc_status remember(ascc_step *step, ascc_particles *p)
+{
+    const int32_t history = step->model->plan.history;
+    if (history <= p->past_count || ascc_particles_arrange(p, 0, 0, history))
+        return ASCC_OK;
+    return ascc_fail(&step->message, ASCC_ERROR_MEMORY,
+                     "no memory for %d velocities of %zu particles", history, p->fluid_count);
+}
+
 ascc_status ascc_step_once(ascc_step *step, ascc_particles *p, const ascc_motion *motion,
                            bool first, ascc_arena *arena, ascc_step_state *state)
 {
@@ -220,7 +230,7 @@ ascc_status ascc_step_once(ascc_step *step, ascc_particles *p, const ascc_motion
         .statistics = &step->statistics,
         .since = ascc_clock()};
     const double begin = state->since;
-    ascc_status status = ASCC_OK;
+    ascc_status status = remember(step, p);
     for (size_t i = 0; i < sizeof stages / sizeof *stages && status == ASCC_OK; i++) {
         if (stages[i].moves && all_sleeps(state))
             continue;
@@ -294,7 +304,7 @@ typedef struct kept_field {
     size_t size;
 } kept_field;
 
-#define KEPT_FIELDS 8
+#define KEPT_FIELDS 9
 
 static size_t find_kept(const ascc_particles *p, kept_field field[KEPT_FIELDS])
 {
@@ -308,7 +318,8 @@ static size_t find_kept(const ascc_particles *p, kept_field field[KEPT_FIELDS])
     field[5] = (kept_field){p->wall_velocity, w};
     field[6] = (kept_field){p->bodies, p->body_count * sizeof *p->bodies};
     field[7] = (kept_field){p->rest, p->fluid_count * sizeof *p->rest};
-    return 2 * n + 4 * w + field[6].size + field[7].size;
+    field[8] = (kept_field){p->past, n * (size_t)p->past_count};
+    return 2 * n + 4 * w + field[6].size + field[7].size + field[8].size;
 }
 
 static bool keep(ascc_step *step, const ascc_particles *p)
@@ -353,6 +364,9 @@ static ascc_status run_once(ascc_step *step, ascc_particles *p, ascc_motion *mot
         return status;
     motion->time_step = step->time_step / count;
     const bool first = step->statistics.steps == 0 && !step->continues;
+    status = remember(step, p);
+    if (status != ASCC_OK)
+        return status;
     if (count > 1 && !keep(step, p))
         return ascc_fail(&step->message, ASCC_ERROR_MEMORY, "no memory to keep %zu particles",
                          p->fluid_count);

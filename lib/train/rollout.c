@@ -65,7 +65,12 @@ typedef struct rollout {
     double *state;     /* [unroll + 1] positions before each step, and after the last */
     int64_t *momentum; /* [unroll] before each step */
     double *by_position, *by_velocity, *seen, *place, *velocity;
-    double *by_guess;   /* [fluid] */
+    double *by_guess;    /* [fluid] */
+    size_t past_numbers; /* velocities of earlier steps: [fluid][history][dimension] */
+    double *past;        /* [unroll] before each step */
+    double *by_past;     /* of one step */
+    double *
+        owed; /* [history][fluid][dimension] what later steps read of velocities that are still to come */
     size_t first_frame; /* of the first step with gradient: state 0 is there */
 } rollout;
 
@@ -73,7 +78,8 @@ static bool take_memory(rollout *r)
 {
     ascc_rollout_worker *w = r->worker;
     const size_t states = (size_t)r->task->unroll + 1, n = r->numbers;
-    const size_t count = 2 * r->walls + n + 2 * states * n + 6 * n;
+    const size_t past = r->past_numbers;
+    const size_t count = 2 * r->walls + n + 2 * states * n + 6 * n + (states + 2) * past;
     void *memory = w->memory;
     if (!ascc_grow(&w->context->allocator, &memory, &w->memory_count, count, sizeof *w->memory))
         return false;
@@ -89,6 +95,9 @@ static bool take_memory(rollout *r)
     at += states * n;
     for (size_t i = 0; i < sizeof part / sizeof *part; i++, at += n)
         *part[i] = at;
+    r->past = at;
+    r->by_past = at += states * past;
+    r->owed = at + past;
     return true;
 }
 
@@ -132,6 +141,38 @@ static void place_walls(rollout *r, size_t frame)
     find_wall_velocities(r, frame);
 }
 
+/* Velocities of earlier steps by frame difference; before the sequence begins they were the same. */
+static void start_past(rollout *r, size_t frame)
+{
+    ascc_particles *p = r->particles;
+    const size_t d = (size_t)p->dimension, history = (size_t)r->plan->history;
+    ascc_particles_fill_past(p, 0, p->fluid_count, 0);
+    for (size_t age = 0; age < history && frame >= age + 2; age++) {
+        truth_at(r, frame - age - 1, r->truth);
+        truth_at(r, frame - age - 2, r->state); /* free until the first step */
+        for (size_t k = 0; k < r->numbers; k++)
+            p->past[(k / d * history + age) * d + k % d] =
+                (r->truth[k] - r->state[k]) / r->motion.time_step;
+        ascc_particles_fill_past(p, 0, p->fluid_count, (int32_t)age + 1);
+    }
+}
+
+/* Noise of a coordinate whose past the network sees: velocities walk at random, and the network has to end that.
+ * Places have none: what it could not know it is not asked to correct. Returns what is added to the velocity. */
+static double add_walk(rollout *r, size_t k, ascc_random *random)
+{
+    ascc_particles *p = r->particles;
+    const size_t d = (size_t)p->dimension, history = (size_t)r->plan->history;
+    const double step = r->task->jitter / r->motion.time_step / sqrt((double)history + 1.0);
+    double noise = 0.0;
+    for (size_t age = history + 1; age-- > 0;) {
+        noise += step * ascc_random_normal(random);
+        if (age > 0)
+            p->past[(k / d * history + age - 1) * d + k % d] += noise;
+    }
+    return noise;
+}
+
 /* Puts the particles where the sequence has them, with velocities by frame difference. */
 static void start_at(rollout *r, size_t frame, ascc_random *random)
 {
@@ -141,7 +182,17 @@ static void start_at(rollout *r, size_t frame, ascc_random *random)
     truth_at(r, frame, p->position);
     for (size_t k = 0; k < r->numbers; k++) {
         double velocity = (p->position[k] - r->truth[k]) / dt;
-        if (jitter > 0.0) {
+        (void)ascc_to_quanta(p->mass[k / (size_t)p->dimension] * velocity, p->quantum,
+                             &p->momentum[k]);
+    }
+    if (r->plan->history)
+        start_past(r, frame);
+    truth_at(r, frame - 1, r->truth);
+    for (size_t k = 0; jitter > 0.0 && k < r->numbers; k++) {
+        double velocity = (p->position[k] - r->truth[k]) / dt;
+        if (r->plan->history) {
+            velocity += add_walk(r, k, random);
+        } else {
             p->position[k] += jitter * ascc_random_normal(random);
             velocity += jitter / dt * ascc_random_normal(random);
         }
@@ -165,6 +216,8 @@ static ascc_status open_particles(rollout *r)
     const ascc_const_array wall = {.data = r->wall, .scalar = ASCC_DOUBLE};
     const ascc_const_array normal = {.data = r->normal, .scalar = ASCC_DOUBLE};
     ascc_status status = ascc_particles_create(r->worker->context, &options, &r->particles);
+    if (status == ASCC_OK && !ascc_particles_arrange(r->particles, 0, 0, r->plan->history))
+        status = ASCC_ERROR_MEMORY;
     if (status == ASCC_OK)
         status =
             ascc_particles_add_fluid(r->particles, s->fluid_count, &position, NULL, NULL, NULL);
@@ -219,12 +272,18 @@ static void keep_state(rollout *r, size_t t)
 {
     memcpy(r->state + t * r->numbers, r->particles->position, r->numbers * sizeof *r->state);
     memcpy(r->momentum + t * r->numbers, r->particles->momentum, r->numbers * sizeof *r->momentum);
+    if (r->past_numbers)
+        memcpy(r->past + t * r->past_numbers, r->particles->past,
+               r->past_numbers * sizeof *r->past);
 }
 
 static void restore_state(rollout *r, size_t t)
 {
     memcpy(r->particles->position, r->state + t * r->numbers, r->numbers * sizeof *r->state);
     memcpy(r->particles->momentum, r->momentum + t * r->numbers, r->numbers * sizeof *r->momentum);
+    if (r->past_numbers)
+        memcpy(r->particles->past, r->past + t * r->past_numbers,
+               r->past_numbers * sizeof *r->past);
 }
 
 /* Steps whose arenas are kept: the last ones, as many as fit. */
@@ -283,6 +342,19 @@ static ascc_status walls_back(rollout *r, size_t frame)
                                     ascc_plan_wall_support(r->plan));
 }
 
+/* Adds to the gradient of velocities before a step what later steps read of them, and notes what this one read of
+ * those before. */
+static void settle_past(rollout *r)
+{
+    const size_t n = r->numbers, d = (size_t)r->plan->dimension, history = (size_t)r->plan->history;
+    for (size_t k = 0; k < n; k++)
+        r->by_velocity[k] += r->owed[k];
+    for (size_t age = 0; age < history; age++)
+        for (size_t k = 0; k < n; k++)
+            r->owed[age * n + k] = (age + 1 < history ? r->owed[(age + 1) * n + k] : 0.0) +
+                                   r->by_past[(k / d * history + age) * d + k % d];
+}
+
 /* Gradients after a step become those before it. */
 static ascc_status step_back(rollout *r, size_t t, const ascc_step_state *state, float *packed)
 {
@@ -304,6 +376,8 @@ static ascc_status step_back(rollout *r, size_t t, const ascc_step_state *state,
     for (size_t k = 0; k < n; k++)
         r->by_velocity[k] += dt * r->by_position[k];
     ascc_arena_reset(&w->scratch);
+    if (r->past_numbers)
+        memset(r->by_past, 0, r->past_numbers * sizeof *r->by_past);
     const bool first = t == 0;
     const bool places = r->task->position_gradients && !first;
     const ascc_backward pass = {.run = &state->run,
@@ -315,6 +389,7 @@ static ascc_status step_back(rollout *r, size_t t, const ascc_step_state *state,
                                 .guess = r->by_guess,
                                 .packed = packed,
                                 .velocity = first ? NULL : r->velocity,
+                                .past = r->past_numbers ? r->by_past : NULL,
                                 .seen = places ? r->seen : NULL,
                                 .place = places ? r->place : NULL};
     const ascc_status status = ascc_backward_run(&pass);
@@ -323,6 +398,8 @@ static ascc_status step_back(rollout *r, size_t t, const ascc_step_state *state,
         r->by_velocity[k] += r->velocity[k] + carried * r->seen[k];
         r->by_position[k] += r->seen[k] + r->place[k];
     }
+    if (r->past_numbers)
+        settle_past(r);
     return status;
 }
 
@@ -357,6 +434,8 @@ static void go_back(rollout *r, ascc_rollout_result *result, size_t kept_from, f
     memset(packed, 0, model->packed.count * sizeof *packed);
     memset(r->by_position, 0, n * sizeof *r->by_position);
     memset(r->by_velocity, 0, n * sizeof *r->by_velocity);
+    if (r->past_numbers)
+        memset(r->owed, 0, r->past_numbers * sizeof *r->owed);
     for (size_t t = unroll; t > 0 && result->status == ASCC_OK; t--) {
         size_t arena = t - 1;
         result->status = loss_at(r, t, unroll, &unused, r->by_position, r->by_velocity);
@@ -384,6 +463,7 @@ static ascc_status open_rollout(rollout *r, ascc_rollout_worker *worker,
     *r = (rollout){.worker = worker, .task = task, .plan = plan};
     r->numbers = task->sequence->fluid_count * d;
     r->walls = task->sequence->boundary_count * d;
+    r->past_numbers = r->numbers * (size_t)plan->history;
     r->motion = (ascc_motion){.time_step = task->sequence->time_step, .advection = plan->advection};
     for (size_t c = 0; c < d; c++)
         for (size_t k = 0; k < d; k++)

@@ -4,7 +4,7 @@
  * The first byte says what the rest is, so that the fuzzer reaches beyond the checksum and the counts:
  *   'r'  a whole snapshot
  *   's'  one whose last word becomes the right checksum
- *   'c'  dimension, share of walls, then words from next id on; magic, version, counts, ids and checksum
+ *   'c'  dimension and earlier velocities, share of walls, then words from next id on; magic, version, counts, ids and checksum
  *        are made right
  * Bits 0 and 1 of the last byte choose a model.
  */
@@ -44,10 +44,11 @@ static void seal(unsigned char *bytes, size_t words)
 static unsigned char *complete(const uint8_t *data, size_t size, size_t *made)
 {
     fuzz_input in = {data, size};
-    const size_t d = 2 + (fuzz_take(&in, 1) & 1);
+    const uint64_t first = fuzz_take(&in, 1), past = first >> 1 & 3;
+    const size_t d = 2 + (first & 1);
     const uint64_t share = fuzz_take(&in, 1);
     const size_t head = 4, given = in.left / 8, body = given > head ? given - head : 0;
-    const size_t fluid_words = 2 * d + 3, wall_words = 6 * d + 2;
+    const size_t fluid_words = (2 + (size_t)past) * d + 3, wall_words = 6 * d + 2;
     const size_t walls = body * (size_t)share / 256 / wall_words;
     const size_t fluid = (body - walls * wall_words) / fluid_words;
     const size_t rows = HEADER + fluid * fluid_words + walls * wall_words;
@@ -55,14 +56,14 @@ static unsigned char *complete(const uint8_t *data, size_t size, size_t *made)
     unsigned char *bytes = calloc(words, 8);
     fuzz_require(bytes != NULL);
     put(bytes, 0, UINT64_C(0x50414e5343435341));
-    put(bytes, 1, 4);
+    put(bytes, 1, 4 | past << 32);
     put(bytes, 2, d);
     put(bytes, 3, fluid);
     put(bytes, 4, walls);
     for (size_t w = 5; w + 1 < words; w++)
         put(bytes, w, fuzz_take(&in, 8));
     const size_t fluid_ids = HEADER + fluid * (2 * d + 1);
-    const size_t wall_ids = HEADER + fluid * (fluid_words - 1) + walls * 3 * d;
+    const size_t wall_ids = HEADER + fluid * (2 * d + 2) + walls * 3 * d;
     for (size_t i = 0; i < fluid; i++)
         put(bytes, fluid_ids + i, i + 1);
     for (size_t i = 0; i < walls; i++)
@@ -89,7 +90,7 @@ typedef struct models {
     ascc_model *model[2][MODELS]; /* [dimension - 2] */
 } models;
 
-/* Made once: pairs by grid and by basis, walls that act, contact. */
+/* Made once: pairs by grid and by basis, walls that act, contact; a graph that sees the past. */
 static const models *all_models(void)
 {
     static models made;
@@ -106,12 +107,7 @@ static const models *all_models(void)
          .walls = 1,
          .limit = 0.5,
          .contact = 0.4},
-        {.seed = 4,
-         .channels = 4,
-         .cells = 2,
-         .output_cells = 2,
-         .projection = "none",
-         .plain = 1}};
+        {.seed = 4, .channels = 4, .graph = 1, .history = 2, .radius = 1.45, .plain = 1}};
     if (made.context)
         return &made;
     fuzz_require(ascc_context_create(NULL, &made.context) == ASCC_OK);

@@ -86,7 +86,8 @@ static void write_models(void)
                                    .method = "farthest",
                                    .half_axis = "x",
                                    .plain = 1};
-    const model_random graph = {.channels = 4, .graph = 1, .plain = 1, .radius = 1.45};
+    const model_random graph = {
+        .channels = 4, .graph = 1, .history = 2, .plain = 1, .radius = 1.45};
     for (int i = 0; i < 2; i++) {
         const char kind = "fh"[i];
         char name[32];

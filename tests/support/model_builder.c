@@ -610,7 +610,7 @@ static void add_graph(random_network *n)
     const char *points = n->o.fluid_only ? "fluid" : "all";
     char last[16];
     open_graph_layer(n, "i", points, c);
-    add_dense(n, "i.fluid", "fluid", 0, 0, 1 + d, c);
+    add_dense(n, "i.fluid", "fluid", 0, 0, 1 + d + n->o.history * d, c);
     if (!n->o.fluid_only)
         add_dense(n, "i.boundary", "boundary", 0, 0, 1 + d, c);
     add_second(n, "i", "n0", points);
@@ -637,19 +637,21 @@ static void add_head(random_network *n)
                    "{\"name\":\"random\",\"description\":\"random weights, for tests\","
                    "\"dimension\":%d,\"time_step\":%s,\"gravity\":[0,-9.8125%s],"
                    "\"particle_spacing\":%s,\"rest_density\":1000,\"evaluate\":\"%s\","
-                   "\"features\":{\"fluid\":[%s%s],\"boundary\":[\"%s\",\"normal\"%s]}",
+                   "\"features\":{\"fluid\":[%s%s%s],\"boundary\":[\"%s\",\"normal\"%s]}",
                    o->dimension, model_number(0.005), third, model_number(o->spacing), o->evaluate,
                    o->motion == 3   ? "\"one\",\"motion\""
                    : o->motion == 2 ? "\"motion\",\"one\""
                    : o->motion == 1 ? "\"one\",\"velocity\",\"motion\""
                                     : "\"one\",\"velocity\"",
-                   o->gravity ? ",\"gravity\"" : "", o->area ? "area" : "one",
-                   o->motion && o->motion < 3 ? ",\"motion\"" : "");
+                   o->gravity ? ",\"gravity\"" : "", o->history ? ",\"history\"" : "",
+                   o->area ? "area" : "one", o->motion && o->motion < 3 ? ",\"motion\"" : "");
     if (o->boundary_crop > 0.0)
         model_text_add(&n->text, ",\"boundary_crop\":%s",
                        model_number(o->boundary_crop * o->spacing));
     if (o->relaxation)
         model_text_add(&n->text, ",\"relaxation\":%s", o->relaxation);
+    if (o->history)
+        model_text_add(&n->text, ",\"history\":%d", o->history);
     if (o->graph)
         model_text_add(&n->text, ",\"edges\":{\"points\":\"%s\",\"radius\":%s}",
                        o->fluid_only ? "fluid" : "all", model_number(o->radius * o->spacing));
@@ -990,7 +992,8 @@ static const model_random small_hourglass = {.levels = 2,
                                              .abstraction = 1 + 2 + 16 + 32,
                                              .plain = 1};
 
-static const model_random small_graph = {.channels = 4, .graph = 1, .plain = 1, .radius = 1.45};
+static const model_random small_graph = {
+    .channels = 4, .graph = 1, .history = 2, .plain = 1, .radius = 1.45};
 
 static const model_random *small_of(char kind)
 {

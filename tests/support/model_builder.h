@@ -89,9 +89,10 @@ typedef struct model_random {
      * bit 0: this; 1: relative; 2: means in the first, 3: in the second; 4: of the 8 nearest there; 5: a matrix
      * after the interpolation; 6: farthest points of the fluid alone. */
     int abstraction;
-    int area;  /* 1: the boundary's feature area in place of one */
-    int graph; /* steps of message passing on a graph, in place of convolutions; plain */
-    int guess; /* 1: a layer "guess" of one channel for the relaxation */
+    int area;    /* 1: the boundary's feature area in place of one */
+    int graph;   /* steps of message passing on a graph, in place of convolutions; plain */
+    int history; /* velocities of earlier steps that it sees; graph */
+    int guess;   /* 1: a layer "guess" of one channel for the relaxation */
     const char *relaxation; /* JSON object; NULL = none */
     int direction; /* 1: the last layer's pairs act along their present line; bumps, fluid_only */
     int down;      /* 1: gravity besides, where residuals are */

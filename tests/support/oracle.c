@@ -844,14 +844,17 @@ static void run_layer(network_state *n, int32_t l)
 }
 
 static void set_features(const ascc_plan *plan, const int32_t *feature, int32_t count,
-                         const double *vector, const double *gravity, bool wall, double area,
-                         double *to)
+                         const double *vector, const double *past, const double *gravity, bool wall,
+                         double area, double *to)
 {
     for (int32_t f = 0; f < count; f++)
         if (feature[f] == ASCC_FEATURE_ONE)
             *to++ = 1.0;
         else if (feature[f] == ASCC_FEATURE_AREA)
             *to++ = area;
+        else if (feature[f] == ASCC_FEATURE_HISTORY)
+            for (int c = 0; c < plan->history * plan->dimension; c++)
+                *to++ = past[c] * plan->time_step / plan->spacing;
         else
             for (int c = 0; c < plan->dimension; c++)
                 *to++ = feature[f] == ASCC_FEATURE_GRAVITY
@@ -889,11 +892,12 @@ static void run_layers(network_state *n, const double *velocity)
     n->value[1] = make_values(n, ASCC_SET_BOUNDARY, plan->boundary_channels);
     for (size_t i = 0; i < o->fluid_count; i++)
         set_features(plan, plan->fluid_features, plan->fluid_feature_count, velocity + i * d,
-                     o->gravity, false, 1.0, n->value[0].row + i * (size_t)plan->fluid_channels);
+                     o->past ? o->past + i * (size_t)plan->history * d : NULL, o->gravity, false,
+                     1.0, n->value[0].row + i * (size_t)plan->fluid_channels);
     for (size_t i = 0; i < n->sets->set[ASCC_SET_BOUNDARY].count; i++) {
         const size_t wall = n->sets->set[ASCC_SET_BOUNDARY].point[i].particle - o->fluid_count;
         set_features(plan, plan->boundary_features, plan->boundary_feature_count,
-                     o->normal + wall * d, o->gravity, true, wall_area(o, wall),
+                     o->normal + wall * d, NULL, o->gravity, true, wall_area(o, wall),
                      n->value[1].row + i * (size_t)plan->boundary_channels);
     }
     for (int32_t l = 0; l < plan->layer_count; l++)
@@ -1055,6 +1059,15 @@ static void relax(const network_state *n, const double *before, double *position
     free(guess);
 }
 
+static void add_past(const oracle *o, const double *velocity)
+{
+    const size_t d = (size_t)o->model->plan.dimension, n = (size_t)o->model->plan.history;
+    for (size_t i = 0; n && i < o->fluid_count; i++) {
+        memmove(o->past + (i * n + 1) * d, o->past + i * n * d, (n - 1) * d * sizeof *o->past);
+        memcpy(o->past + i * n * d, velocity + i * d, d * sizeof *o->past);
+    }
+}
+
 void oracle_step(oracle *o, double *position, double *velocity, double *correction)
 {
     const ascc_plan *plan = &o->model->plan;
@@ -1075,6 +1088,7 @@ void oracle_step(oracle *o, double *position, double *velocity, double *correcti
         .o = o, .sets = sets, .value = take((size_t)plan->layer_count + 2, sizeof(values))};
     run_layers(&n, after);
     run_output(&n, moved);
+    add_past(o, velocity);
     for (size_t k = 0; k < numbers; k++) {
         const double carried =
             plan->advection == ASCC_ADVECT_MEAN ? 0.5 * (velocity[k] + after[k]) : after[k];
@@ -1211,7 +1225,7 @@ static void true_frame(const oracle *o, const oracle_sequence *sequence, size_t 
         x[k] = (double)sequence->position[frame * numbers + k];
 }
 
-/* Within which radius the last layer sees: ascc_model_info says the same. */
+/* Within which radius the last layer sees: ascc_model_info says the same. 2 spacings where it sees no neighbours. */
 static double support_radius(const ascc_plan *plan)
 {
     const ascc_layer *layer = &plan->layer[plan->output.term.source - 2];
@@ -1221,7 +1235,7 @@ static double support_radius(const ascc_plan *plan)
     for (int32_t t = layer->first_term; t < layer->first_term + layer->term_count; t++)
         if (searches(&plan->term[t]))
             radius = fmax(radius, plan->term[t].filter.radius);
-    return radius;
+    return radius > 0.0 ? radius : 2.0 * plan->spacing;
 }
 
 static double neighbors_of(const oracle *o, const double *x, size_t i)
@@ -1293,6 +1307,16 @@ double oracle_loss(oracle *o, const oracle_sequence *sequence, const oracle_refe
     true_frame(o, sequence, frame, x);
     for (size_t k = 0; k < numbers; k++)
         v[k] = (x[k] - y[k]) / o->model->plan.time_step;
+    const size_t history = (size_t)o->model->plan.history;
+    o->past = take(history * numbers, sizeof *o->past);
+    for (size_t age = 0; age < history; age++) {
+        const bool there = frame >= age + 2;
+        true_frame(o, sequence, there ? frame - age - 1 : 1, way);
+        true_frame(o, sequence, there ? frame - age - 2 : 0, before);
+        for (size_t k = 0; k < numbers; k++)
+            o->past[(k / d * history + age) * d + k % d] =
+                (way[k] - before[k]) / o->model->plan.time_step;
+    }
     o->step = 0;
     const double *moved = o->weight;
     for (int t = 1; t <= warm_up + unroll; t++) {
@@ -1309,6 +1333,8 @@ double oracle_loss(oracle *o, const oracle_sequence *sequence, const oracle_refe
                     (o->model->plan.spacing * (double)o->fluid_count * unroll);
     }
     o->weight = moved;
+    free(o->past);
+    o->past = NULL;
     free(way);
     free(before);
     free(y);

@@ -31,6 +31,8 @@ typedef struct oracle {
     double gravity[3];
     size_t fluid_count, wall_count;
     const double *wall, *normal; /* [wall_count][dimension] */
+    double *
+        past; /* [fluid_count][history][dimension] velocities before earlier steps, the last first; steps add to it */
     /* Adds the term of an operation that the oracle does not know, from the source's row; or NULL. */
     void (*add_other)(const ascc_term *term, const double *in, double *out);
     oracle_mode mode;
