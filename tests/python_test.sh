@@ -69,7 +69,7 @@ page() {
 check 'the code in docs/python.md runs' page python.md
 check 'so does that in docs/walls.md' page walls.md
 # The package's own tests, and a network through it; their numbers follow.
-for name in test_python test_pointnet; do
+for name in test_python test_pointnet test_gns; do
     "$python" "$root/tests/$name.py" >"$folder/$name.tap" 2>&1 || failed=1
     grep -q '^1\.\.[1-9]' "$folder/$name.tap" ||
         { echo "not ok - tests/$name.py runs"; sed 's/^/# /' "$folder/$name.tap"; }
@@ -78,5 +78,5 @@ awk -v number="$number" '/^1\.\./ { next }
     /^ok / { sub(/^ok [0-9]+/, "ok " ++number) }
     /^not ok / { sub(/^not ok [0-9]+/, "not ok " ++number) }
     { print }
-    END { print "1.." number }' "$folder/test_python.tap" "$folder/test_pointnet.tap"
+    END { print "1.." number }' "$folder/test_python.tap" "$folder/test_pointnet.tap" "$folder/test_gns.tap"
 exit $failed

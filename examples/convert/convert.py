@@ -28,6 +28,8 @@ WEIGHTS = {
     "dmcf": "TensorFlow checkpoint of the DMCF Liquid3d network (its .index file)",
     "cconv-h5": "Keras .h5 of the CConv Liquid3d network",
     "cconv-pt": "PyTorch .pt of the CConv Liquid3d network",
+    "lagrangebench-gns": "folder of a GNS that LagrangeBench trained (params_tree.pkl,\n"
+    "    params_array.npy) beside the data's metadata.json; makes a model file at once",
 }
 
 
@@ -139,6 +141,13 @@ def arguments(argv):
     )
     weights.add_argument("input")
     weights.add_argument("-o", "--output", required=True, metavar="FILE")
+    weights.add_argument("--metadata", help="of lagrangebench-gns: metadata.json, if it is elsewhere")
+    weights.add_argument(
+        "--noise",
+        type=float,
+        default=3e-4,
+        help="of lagrangebench-gns: standard deviation of the noise that it was trained with (3e-4)",
+    )
     return parser.parse_args(argv)
 
 
@@ -194,6 +203,10 @@ def main(argv=None):
         elif options.command == "usd":
             importlib.import_module("write_usd").write(
                 options.input, options.output, max(options.every, 1)
+            )
+        elif options.format == "lagrangebench-gns":
+            importlib.import_module("read_lagrangebench_gns").convert(
+                options.input, options.output, options
             )
         else:
             importlib.import_module("weights").convert(
