@@ -463,12 +463,13 @@ static void at_the_centre_only_the_first_harmonic_counts(void **state)
 
 /* The numbers of a pair, as kernels.h states them. */
 static void numbers_of(const float u[3], const float *vector, const float own[3], int wall,
-                       size_t dimension, double q[8])
+                       const float *drift, size_t dimension, double q[8])
 {
     double relative[3];
     for (size_t c = 0; c < 3; c++) {
         const double other = c < dimension ? (double)vector[c] : 0.0;
-        relative[c] = (wall ? 0.0 : other) - (double)own[c];
+        const double moved = drift && c < dimension ? (double)drift[c] : 0.0;
+        relative[c] = (wall ? moved : other) - (double)own[c];
         q[1 + c] = (double)u[c];
         q[5 + c] = wall ? other : relative[c];
     }
@@ -481,12 +482,14 @@ static void moments_equal_doubles_and_have_the_same_bits_on_every_cpu(void **sta
     (void)state;
     ascc_kernels table[16];
     const int count = tables(table);
-    for (size_t variant = 0; variant < 8 * 2 * 2 * 2; variant++) {
+    for (size_t variant = 0; variant < 8 * 2 * 2 * 2 * 2; variant++) {
         const size_t bumps = 1 + variant % 8, dimension = 2 + variant / 8 % 2;
         const int wall = (int)(variant / 16 % 2), weighted = (int)(variant / 32 % 2);
+        const int moves = (int)(variant / 64 % 2);
         for (size_t k = 0; k < 20; k++) {
             const size_t a = 8 + 8 * (k % 2);
             float *coordinate[4], *feature = floats(51 * a), *weight = floats(50 * 3);
+            float *drift = moves ? floats(50 * 4) : NULL;
             float own[3] = {0.3f, -0.2f, dimension == 3 ? 0.9f : 0.0f};
             uint32_t neighbor[24];
             for (size_t c = 0; c < 4; c++) {
@@ -505,7 +508,7 @@ static void moments_equal_doubles_and_have_the_same_bits_on_every_cpu(void **sta
                                       .distance = coordinate[3]};
             float *want = guarded(bumps * 8);
             table[0].moments(&pairs, neighbor, k, feature, a, own, wall, dimension,
-                             weighted ? weight : NULL, 3, bumps, want);
+                             weighted ? weight : NULL, 3, drift, bumps, want);
             check_guard(want, bumps * 8);
             for (size_t b = 0; b < bumps; b++) {
                 double sum[8] = {0.0}, q[8];
@@ -513,7 +516,8 @@ static void moments_equal_doubles_and_have_the_same_bits_on_every_cpu(void **sta
                     const float u[3] = {coordinate[0][i], coordinate[1][i], coordinate[2][i]};
                     const double bump = bump_of((double)coordinate[3][i], bumps, b);
                     const double scale = weighted ? (double)weight[neighbor[i] * 3] : 1.0;
-                    numbers_of(u, feature + neighbor[i] * a, own, wall, dimension, q);
+                    numbers_of(u, feature + neighbor[i] * a, own, wall,
+                               moves ? drift + neighbor[i] * 4 : NULL, dimension, q);
                     for (size_t n = 0; n < 8; n++)
                         sum[n] += bump * (n < 5 ? scale : 1.0) * q[n];
                 }
@@ -523,13 +527,14 @@ static void moments_equal_doubles_and_have_the_same_bits_on_every_cpu(void **sta
             for (int t = 1; t < count; t++) {
                 float *got = guarded(bumps * 8);
                 table[t].moments(&pairs, neighbor, k, feature, a, own, wall, dimension,
-                                 weighted ? weight : NULL, 3, bumps, got);
+                                 weighted ? weight : NULL, 3, drift, bumps, got);
                 check_same_bits(want, got, bumps * 8 + 8, "moments");
                 free(got);
             }
             for (size_t c = 0; c < 4; c++)
                 free(coordinate[c]);
             free(feature);
+            free(drift);
             free(weight);
             free(want);
         }
@@ -579,6 +584,7 @@ static void random_lines(lines_case *c, size_t bumps, unsigned options)
                             .coefficient = options & 1 ? c->coefficient : NULL,
                             .motion = options & 2 ? c->motion : NULL,
                             .a = 8,
+                            .drift = options & 33 || !(options & 2) ? NULL : c->motion,
                             .area = options & 1 ? NULL : c->motion + 5,
                             .area_stride = 8,
                             .place = (options & 5) == 5 ? c->place : NULL,
@@ -605,8 +611,9 @@ static void impulse_of(const lines_case *c, size_t j, double mass, double impuls
     for (size_t i = 0; i < 3; i++) {
         u[i] = length > 0.0 ? line[i] / length : 0.0;
         if (l->motion && i < l->dimension)
-            approach +=
-                u[i] * ((double)c->motion[i] - (l->both ? (double)c->motion[j * 8 + i] : 0.0));
+            approach += u[i] * ((double)c->motion[i] - (l->both    ? (double)c->motion[j * 8 + i]
+                                                        : l->drift ? (double)l->drift[j * 4 + i]
+                                                                   : 0.0));
     }
     for (size_t b = 0; b < l->bumps; b++)
         for (size_t p = 0; p < 2; p++)
@@ -625,7 +632,7 @@ static void pair_lines_equal_doubles_and_have_the_same_bits_on_every_cpu(void **
     (void)state;
     ascc_kernels table[16];
     const int count = tables(table);
-    for (unsigned options = 0; options < 32; options++)
+    for (unsigned options = 0; options < 64; options++)
         for (size_t bumps = 1; bumps <= 8; bumps++)
             for (size_t k = 0; k <= ASCC_PAIR_BATCH; k = k < 10 ? k + 1 : k + 9) {
                 static lines_case c;

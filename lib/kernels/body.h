@@ -443,11 +443,11 @@ static void gather_basis(const float *factor, size_t stride, size_t bumps, size_
 static inline void pair_numbers(const ascc_pairs *pairs, size_t i, const uint32_t *neighbor,
                                 size_t n, const float *feature, size_t a, const float own[3],
                                 int wall, size_t dimension, const float *weight, size_t stride,
-                                float number[LANES][LANES])
+                                const float *drift, float number[LANES][LANES])
 {
     const float *from[LANES];
     float scale[LANES];
-    vector v[4], relative[3];
+    vector v[4], relative[3], moved[4] = {fill(0.0f), fill(0.0f), fill(0.0f), fill(0.0f)};
     for (size_t l = 0; l < LANES; l++) {
         const size_t j = neighbor[i + (l < n ? l : 0)];
         from[l] = feature + j * a;
@@ -455,10 +455,14 @@ static inline void pair_numbers(const ascc_pairs *pairs, size_t i, const uint32_
             scale[l] = weight[j * stride];
     }
     load_quads(from, v);
+    for (size_t l = 0; drift && l < LANES; l++)
+        from[l] = drift + (size_t)neighbor[i + (l < n ? l : 0)] * 4;
+    if (drift)
+        load_quads(from, moved);
     if (dimension < 3)
         v[2] = fill(0.0f);
     for (size_t c = 0; c < 3; c++) {
-        relative[c] = minus(wall ? fill(0.0f) : v[c], fill(own[c]));
+        relative[c] = minus(wall ? moved[c] : v[c], fill(own[c]));
         store(number[5 + c], wall ? v[c] : relative[c]);
     }
     const vector s = weight ? load(scale) : fill(1.0f);
@@ -475,7 +479,8 @@ static inline void pair_numbers(const ascc_pairs *pairs, size_t i, const uint32_
 /* A lane for each bump: those that a pair does not reach add 0. */
 static void moments(const ascc_pairs *pairs, const uint32_t *neighbor, size_t k,
                     const float *feature, size_t a, const float own[3], int wall, size_t dimension,
-                    const float *weight, size_t stride, size_t bumps, float *sum)
+                    const float *weight, size_t stride, const float *drift, size_t bumps,
+                    float *sum)
 {
     static const float lanes[LANES] = {0.0f, 1.0f, 2.0f, 3.0f, 4.0f, 5.0f, 6.0f, 7.0f};
     const vector bump = load(lanes), count = fill((float)bumps);
@@ -485,7 +490,7 @@ static void moments(const ascc_pairs *pairs, const uint32_t *neighbor, size_t k,
     for (size_t i = 0; i < k; i += LANES) {
         const size_t n = k - i < LANES ? k - i : LANES;
         float number[LANES][LANES];
-        pair_numbers(pairs, i, neighbor, n, feature, a, own, wall, dimension, weight, stride,
+        pair_numbers(pairs, i, neighbor, n, feature, a, own, wall, dimension, weight, stride, drift,
                      number);
         UNROLL for (size_t l = 0; l < n; l++)
         {
@@ -795,9 +800,10 @@ static void find_approach(const ascc_lines *l, size_t row, const uint32_t *neigh
     for (size_t i = 0; i < n; i += LANES) {
         const float *from[LANES];
         vector four[4] = {fill(0.0f), fill(0.0f), fill(0.0f), fill(0.0f)};
-        for (size_t j = 0; l->both && j < LANES; j++)
-            from[j] = l->motion + (size_t)neighbor[i + j] * l->a;
-        if (l->both)
+        for (size_t j = 0; j < LANES; j++)
+            from[j] = l->both ? l->motion + (size_t)neighbor[i + j] * l->a
+                              : (l->drift ? l->drift + (size_t)neighbor[i + j] * 4 : NULL);
+        if (l->both || l->drift)
             load_quads(from, four);
         store(v[0] + i, four[0]);
         store(v[1] + i, four[1]);

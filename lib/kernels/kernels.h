@@ -59,11 +59,12 @@ typedef struct ascc_lines {
     const int32_t *row, *neighbor; /* places as the network sees them, [row][4] */
     float inverse_radius;
     size_t bumps, dimension;
-    int both; /* neighbours are rows of the same set; else they rest, and have no coefficients */
+    int both; /* neighbours are rows of the same set; else they are walls, and have no coefficients */
     const float *coefficient; /* [row][16], if both */
     /* Motions of rows, a apart: `dimension` numbers are read, but 4 loaded; NULL = no damping. */
     const float *motion;
     size_t a;
+    const float *drift; /* motions of walls, [row][4]; NULL = 0 */
     /* Of neighbours, so far apart, what strength and damping are multiplied by; NULL = 1. */
     const float *area;
     size_t area_stride;
@@ -132,12 +133,14 @@ typedef struct ascc_kernels {
 
     /* sum[bump][8] = sum over the pairs j < k in order of a bump (as in basis, of the distance) times the
      * eight numbers 1, x, y, z, w, each times weight, and d[3]. fluid: d = feature[neighbor[j]] - own; wall: d =
-     * feature[neighbor[j]]; w, the speed of approach, is -(d . xyz), of a wall own . xyz. One chain of
+     * feature[neighbor[j]]; w, the speed of approach, is -(d . xyz), of a wall (own - drift) . xyz. One chain of
      * fma a number. feature rows are a apart, of which `dimension` numbers are read (but 4 are loaded);
-     * weight[neighbor[j] * stride], NULL = 1. With 2 dimensions z and d[2] are 0. */
+     * weight[neighbor[j] * stride], NULL = 1; drift[neighbor[j]][4] of walls, NULL = 0. With 2 dimensions z and
+     * d[2] are 0. */
     void (*moments)(const ascc_pairs *pairs, const uint32_t *neighbor, size_t k,
                     const float *feature, size_t a, const float own[3], int wall, size_t dimension,
-                    const float *weight, size_t stride, size_t bumps, float *sum);
+                    const float *weight, size_t stride, const float *drift, size_t bumps,
+                    float *sum);
 
     /* out[j][b] = window * sum over a of (center[a] + feature[neighbor[j]][a]) * kernel(j)[b][a],
      * kernel(j) = sum over c of trilinear weight * weight[c][b][a], for each pair j < k on its own.

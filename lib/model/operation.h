@@ -93,6 +93,8 @@ typedef struct ascc_operation {
     int (*ends)(const ascc_term *term);
     /* It reads the fluid's features besides its source. NULL = never. */
     bool (*reads_features)(const ascc_term *term);
+    /* It reads `drift` of its source, too. NULL = never. */
+    bool (*reads_drift)(const ascc_term *term);
     /* It can read its rows from a tile, ascc_tile.given, before their value is stored. */
     bool reads_tiles;
 

@@ -25,7 +25,8 @@ void ascc_geometry_of(ascc_geometry *g, const ascc_network_run *run, const ascc_
                                   q->low[2][query], inverse, (int)filter->mapping, &g->pairs);
 }
 
-/* Features of a row's neighbours, their motion less the row's own. */
+/* Features of a row's neighbours, their motion less the row's own. The feature of walls is 0, so that who reads
+ * it as it is does not ask in which frame they move. */
 static void relative_features(const ascc_network_run *run, const ascc_term *term, size_t row,
                               const uint32_t *neighbor, size_t count, float *restrict to)
 {
@@ -34,13 +35,14 @@ static void relative_features(const ascc_network_run *run, const ascc_term *term
     const int32_t motion = ascc_plan_motion(plan, term->source);
     const float *own = run->value[0].raw + row * own_a + ascc_plan_motion(plan, 0);
     const float *feature = run->value[term->source].raw;
+    const float *drift = term->source == 1 ? run->hierarchy->drift : NULL;
     for (size_t k = 0; k < count; k++, to += a) {
         const float *restrict from = feature + neighbor[k] * a;
         for (size_t c = 0; c < a; c += 8) /* rows are whole vectors */
             for (size_t n = 0; n < 8; n++)
                 to[c + n] = from[c + n];
         for (int32_t c = 0; c < plan->dimension; c++)
-            to[motion + c] -= own[c];
+            to[motion + c] -= drift ? own[c] - drift[neighbor[k] * 4 + (size_t)c] : own[c];
     }
 }
 

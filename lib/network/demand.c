@@ -57,6 +57,30 @@ static void prepare_term(ascc_network *network, int32_t t, int32_t set)
         network->wants[1] |= ASCC_WANTS_RAW;
 }
 
+bool ascc_network_carries(const ascc_network *network, const ascc_term *term)
+{
+    bool weighs = false;
+    for (int t = 0; t < ASCC_MAX_TENSORS; t++)
+        weighs |= term->tensor[t] != NULL;
+    return network->wants[term->source] & ASCC_WANTS_DRIFT && term->source != 0 && !weighs &&
+           !term->rectify;
+}
+
+/* Values are sums of others: those of motions are sums of theirs. */
+static void want_drift(ascc_network *network)
+{
+    const ascc_plan *plan = network->plan;
+    for (int32_t l = plan->layer_count - 1; l >= 0; l--) {
+        const ascc_layer *layer = &plan->layer[l];
+        for (int32_t t = layer->first_term; t < layer->first_term + layer->term_count; t++) {
+            const ascc_term *term = &plan->term[t];
+            if ((term->operation->reads_drift && term->operation->reads_drift(term)) ||
+                network->wants[l + 2] & ASCC_WANTS_DRIFT)
+                network->wants[term->source] |= ASCC_WANTS_DRIFT;
+        }
+    }
+}
+
 /* Pairs of a relaxation: a list that is made anyway, if it is not much longer than needed. */
 static int32_t relaxation_key(ascc_network *network, int32_t source)
 {
@@ -135,6 +159,7 @@ ascc_status ascc_network_create(ascc_network *network, const ascc_allocator *all
         }
     network->last_reader[plan->output.term.source] = plan->layer_count;
     prepare_term(network, plan->term_count, ascc_network_set(network, plan->output.term.source));
+    want_drift(network);
     if (plan->relaxation.guess)
         network->wants[plan->relaxation.guess] |= ASCC_WANTS_RECTIFIED;
     if (plan->edge_radius > 0.0) {

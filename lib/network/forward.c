@@ -18,6 +18,7 @@ typedef struct layer_job {
     size_t scratch_size, tile_offset, next_offset, term_offset;
     ascc_scratch_sizes sizes;
     uint32_t *sequence; /* 0, 1, 2, ... */
+    bool drift;         /* of walls' motions */
 } layer_job;
 
 ascc_scratch_sizes ascc_network_sizes(const ascc_network_run *run, const ascc_layer *layer)
@@ -130,7 +131,7 @@ static int32_t begin_tile(const layer_job *job, const ascc_tile *tile)
     const ascc_layer *layer = job->layer;
     const int32_t l = (int32_t)(layer - job->run->plan->layer);
     memset(tile->sum, 0, tile->n * tile->width * sizeof *tile->sum);
-    if (!is_begun(job->run->network, l))
+    if (job->drift || !is_begun(job->run->network, l))
         return 0;
     const ascc_value *value = &job->run->value[l + 2]; /* there, even if it is passed on in turn */
     for (size_t r = 0; r < tile->n; r++)
@@ -156,7 +157,8 @@ static void compute_tiles(void *data, size_t begin, size_t end, int32_t slot)
         tile.list = job->list + at;
         for (int32_t t = begin_tile(job, &tile); t < job->layer->term_count; t++) {
             const ascc_term *term = &job->run->plan->term[job->layer->first_term + t];
-            term->operation->forward(&tile, term);
+            if (!job->drift || ascc_network_carries(job->run->network, term))
+                term->operation->forward(&tile, term);
         }
         if (!job->value)
             pass_on(job, &tile, scratch + job->next_offset);
@@ -292,14 +294,46 @@ static ascc_status prepare_terms(const ascc_network_run *run, const ascc_layer *
     return status;
 }
 
+static ascc_status no_memory(const ascc_network_run *run, const ascc_layer *layer)
+{
+    return ascc_fail(run->tools->message, ASCC_ERROR_MEMORY, "no memory for layer %s", layer->name);
+}
+
+/* The layer of a job tile by tile, in scratch that is lent. next_width: of values that are given a tile. */
+static ascc_status run_job(layer_job *job, uint32_t *list, size_t next_width)
+{
+    const ascc_network_run *run = job->run;
+    const ascc_layer *layer = job->layer;
+    const ascc_search_tools *tools = run->tools;
+    const size_t slots = (size_t)ascc_workers_count(tools->workers);
+    job->list = list;
+    job->sizes = ascc_network_sizes(run, layer);
+    job->width = ascc_padded(layer->channels) + 8;
+    job->tile_offset = ASCC_TILE_ROWS * (job->sizes.column + ASCC_COLUMN_PADDING);
+    job->next_offset = job->tile_offset + ASCC_TILE_ROWS * job->width;
+    job->term_offset = job->next_offset + ASCC_TILE_ROWS * next_width;
+    job->scratch_size = job->term_offset + job->sizes.scratch;
+    const ascc_arena_mark mark = ascc_arena_mark_of(tools->arena);
+    job->sequence = ascc_arena_lend(tools->arena, job->sizes.room, sizeof *job->sequence);
+    for (size_t i = 0; job->sequence && i < job->sizes.room; i++)
+        job->sequence[i] = (uint32_t)i;
+    job->scratch = ascc_arena_lend(tools->arena, slots * job->scratch_size, sizeof(float));
+    if (!job->scratch || !job->sequence)
+        return no_memory(run, layer);
+    const int32_t value = (int32_t)(layer - run->plan->layer) + 2;
+    const size_t count =
+        list_active(tools, run->value[value].active, ascc_network_rows(run, layer->set), list);
+    ascc_workers_run(tools->workers, count, ASCC_TILE_ROWS * 4, compute_tiles, job);
+    ascc_arena_return(tools->arena, mark);
+    return ASCC_OK;
+}
+
 static ascc_status compute_layer(ascc_network_run *run, int32_t l, uint32_t *list)
 {
     const ascc_layer *layer = &run->plan->layer[l];
-    const ascc_search_tools *tools = run->tools;
     const bool passed_on = ascc_network_passes_on(run->network, l);
-    layer_job job = {.run = run, .layer = layer, .list = list};
+    layer_job job = {.run = run, .layer = layer};
     job.value = passed_on ? NULL : &run->value[l + 2];
-    const size_t slots = (size_t)ascc_workers_count(tools->workers);
     size_t next_width;
     if (is_begun(run->network, l) && layer->term_count == 1)
         return ASCC_OK;
@@ -307,25 +341,58 @@ static ascc_status compute_layer(ascc_network_run *run, int32_t l, uint32_t *lis
     if (status != ASCC_OK)
         return status;
     if (!take_values(run, l, passed_on, &next_width))
-        return ascc_fail(tools->message, ASCC_ERROR_MEMORY, "no memory for layer %s", layer->name);
-    job.sizes = ascc_network_sizes(run, layer);
-    job.width = ascc_padded(layer->channels) + 8;
-    job.tile_offset = ASCC_TILE_ROWS * (job.sizes.column + ASCC_COLUMN_PADDING);
-    job.next_offset = job.tile_offset + ASCC_TILE_ROWS * job.width;
-    job.term_offset = job.next_offset + ASCC_TILE_ROWS * next_width;
-    job.scratch_size = job.term_offset + job.sizes.scratch;
-    const ascc_arena_mark mark = ascc_arena_mark_of(tools->arena);
-    job.sequence = ascc_arena_lend(tools->arena, job.sizes.room, sizeof *job.sequence);
-    for (size_t i = 0; job.sequence && i < job.sizes.room; i++)
-        job.sequence[i] = (uint32_t)i;
-    job.scratch = ascc_arena_lend(tools->arena, slots * job.scratch_size, sizeof(float));
-    if (!job.scratch || !job.sequence)
-        return ascc_fail(tools->message, ASCC_ERROR_MEMORY, "no memory for layer %s", layer->name);
-    const size_t count =
-        list_active(tools, run->value[l + 2].active, ascc_network_rows(run, layer->set), list);
-    ascc_workers_run(tools->workers, count, ASCC_TILE_ROWS * 4, compute_tiles, &job);
-    ascc_arena_return(tools->arena, mark);
+        return no_memory(run, layer);
+    return run_job(&job, list, next_width);
+}
+
+/* ---- What moving walls carry ---- */
+
+static float *take_drift(ascc_network_run *run, int32_t v)
+{
+    const size_t rows = run->hierarchy->set[ascc_network_set(run->network, v)].count + 1;
+    const size_t channels = ascc_padded(ascc_network_channels(run->network, v));
+    return run->value[v].drift = ascc_arena_take(run->tools->arena, rows, channels * sizeof(float));
+}
+
+/* Motions of walls times their areas, where their features have normals. */
+static ascc_status begin_drift(ascc_network_run *run)
+{
+    const ascc_hierarchy *h = run->hierarchy;
+    const int32_t normal = ascc_plan_feature(run->plan, 1, ASCC_FEATURE_NORMAL);
+    const size_t stride = ascc_padded(run->plan->boundary_channels);
+    const size_t rows = h->set[ASCC_SET_BOUNDARY].count;
+    if (!h->drift || !(run->network->wants[1] & ASCC_WANTS_DRIFT) || normal < 0)
+        return ASCC_OK;
+    float *to = take_drift(run, 1);
+    if (!to)
+        return ascc_fail(run->tools->message, ASCC_ERROR_MEMORY, "no memory for the features");
+    const float *area = ascc_wall_areas(run);
+    memset(to, 0, (rows + 1) * stride * sizeof *to);
+    for (size_t i = 0; i < rows; i++)
+        for (int32_t c = 0; c < run->plan->dimension; c++)
+            to[i * stride + (size_t)(normal + c)] =
+                (area ? area[i * stride] : 1.0f) * h->drift[i * 4 + (size_t)c];
     return ASCC_OK;
+}
+
+/* The layer once more, of these alone. */
+static ascc_status carry_layer(ascc_network_run *run, int32_t l, uint32_t *list)
+{
+    const ascc_arena_mark mark = ascc_arena_mark_of(run->tools->arena);
+    ascc_network_run other = *run;
+    layer_job job = {.run = &other, .layer = &run->plan->layer[l], .drift = true};
+    if (!run->value[1].drift || !(run->network->wants[l + 2] & ASCC_WANTS_DRIFT))
+        return ASCC_OK;
+    other.value =
+        ascc_arena_lend(run->tools->arena, (size_t)run->network->value_count, sizeof *other.value);
+    if (!take_drift(run, l + 2) || !other.value)
+        return no_memory(run, job.layer);
+    for (int32_t v = 0; v < run->network->value_count; v++)
+        other.value[v] = (ascc_value){.active = run->value[v].active, .raw = run->value[v].drift};
+    job.value = &other.value[l + 2];
+    const ascc_status status = run_job(&job, list, 0);
+    ascc_arena_return(run->tools->arena, mark);
+    return status;
 }
 
 ascc_status ascc_network_forward(ascc_network_run *run, const float *fluid_features,
@@ -343,8 +410,11 @@ ascc_status ascc_network_forward(ascc_network_run *run, const float *fluid_featu
         ascc_workers_run(run->tools->workers, run->hierarchy->set[v].count, 4096, place_features,
                          &job);
     }
-    ascc_status status = ASCC_OK;
-    for (int32_t l = 0; status == ASCC_OK && l < network->plan->layer_count; l++)
+    ascc_status status = begin_drift(run);
+    for (int32_t l = 0; status == ASCC_OK && l < network->plan->layer_count; l++) {
         status = compute_layer(run, l, list);
+        if (status == ASCC_OK)
+            status = carry_layer(run, l, list);
+    }
     return status;
 }

@@ -117,6 +117,7 @@ static bool comes_first(const sort_in *job, uint32_t a, uint32_t b)
     } else {
         order = compare_rows(scene->boundary, d, a - fluid, b - fluid);
         order = order ? order : compare_rows(scene->normal, d, a - fluid, b - fluid);
+        order = order ? order : compare_rows(scene->wall_velocity, d, a - fluid, b - fluid);
     }
     return order ? order < 0 : a < b;
 }
@@ -230,6 +231,25 @@ static ascc_status build_level_zero(ascc_hierarchy *h, const ascc_search_tools *
     return ASCC_OK;
 }
 
+/* How walls move, in the order of their set. */
+static ascc_status find_drift(ascc_hierarchy *h, const ascc_search_tools *tools,
+                              const ascc_plan *plan, const ascc_scene *scene)
+{
+    const size_t count = h->set[ASCC_SET_BOUNDARY].count, d = (size_t)plan->dimension;
+    if (!scene->wall_velocity)
+        return ASCC_OK;
+    h->drift = ascc_arena_take(tools->arena, count, 4 * sizeof *h->drift);
+    if (!h->drift)
+        return ascc_fail(tools->message, ASCC_ERROR_MEMORY, "no memory for %zu walls", count);
+    for (size_t i = 0; i < count; i++)
+        for (size_t c = 0; c < 4; c++)
+            h->drift[i * 4 + c] =
+                c < d ? (float)(scene->wall_velocity[ascc_hierarchy_wall_row(h, i) * d + c] *
+                                scene->motion)
+                      : 0.0f;
+    return ASCC_OK;
+}
+
 static ascc_status build_level(ascc_hierarchy *h, const ascc_search_tools *tools,
                                const ascc_plan *plan, int level)
 {
@@ -263,6 +283,8 @@ ascc_status ascc_hierarchy_build(ascc_hierarchy *h, const ascc_search_tools *too
                          "%zu fluid and %zu boundary rows are more than 2^32 - 2",
                          scene->fluid_count, scene->boundary_count);
     ascc_status status = build_level_zero(h, tools, plan, scene);
+    if (status == ASCC_OK)
+        status = find_drift(h, tools, plan, scene);
     for (int level = 1; status == ASCC_OK && level < plan->level_count; level++)
         status = build_level(h, tools, plan, level);
     if (status != ASCC_OK)

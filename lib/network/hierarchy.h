@@ -18,6 +18,7 @@ typedef struct ascc_hierarchy {
     uint32_t *whole[2];  /* and back: [set row] of fluid, boundary */
     int32_t *place[2];   /* low words of fluid, boundary once more: [set row][4], the last 0 */
     const uint8_t *idle; /* rows of fluid whose impulses nobody wants; NULL = none */
+    float *drift; /* motions of walls in spacings a time step, [boundary set row][4]; NULL: all rest */
     ascc_extent extent;  /* of all sets */
     double base_radius;  /* units: level 0 is in the order of cells for it */
     int grid_count;
@@ -35,6 +36,8 @@ typedef struct ascc_scene {
     const uint8_t *near;            /* [boundary count] 1 = fluid may see it; NULL = all */
     /* What tells particles at one place apart, so that the host's order does not; NULL = nothing: */
     const double *velocity, *mass, *normal; /* [fluid][dimension], [fluid], [boundary][dimension] */
+    const double *wall_velocity;            /* [boundary][dimension]; NULL = all rest */
+    double motion;                          /* what makes spacings a time step of it */
 } ascc_scene;
 
 /* Builds all sets the plan uses in the arena. errors: MEMORY, RANGE. */

@@ -15,6 +15,8 @@
 /* Which copies of a value its readers want: as it is, and with negative numbers read as 0. */
 #define ASCC_WANTS_RAW 1
 #define ASCC_WANTS_RECTIFIED 2
+/* And what it would be of walls' motions in place of their normals, where any moves. */
+#define ASCC_WANTS_DRIFT 4
 
 /* What follows from the plan alone, prepared once and then constant. */
 typedef struct ascc_network {
@@ -56,6 +58,8 @@ typedef struct ascc_value {
     uint8_t *active;  /* [rows] */
     float *raw;       /* [rows][padded channels], NULL if only the rectified are read */
     float *rectified; /* or NULL */
+    float
+        *drift; /* of walls' motions in place of their normals and nothing else; NULL: none moves */
 } ascc_value;
 
 typedef struct ascc_network_run {
@@ -92,6 +96,9 @@ ascc_status ascc_network_forward(ascc_network_run *run, const float *fluid_featu
 
 /* Is the value of a layer given to its readers tile by tile, and never stored? */
 bool ascc_network_passes_on(const ascc_network *network, int32_t layer);
+
+/* Does a term sum motions of walls where it sums normals? */
+bool ascc_network_carries(const ascc_network *network, const ascc_term *term);
 
 /* ---- What operations read ---- */
 
@@ -140,6 +147,13 @@ static inline const float *ascc_wall_areas(const ascc_network_run *run)
 {
     const int32_t channel = ascc_plan_feature(run->plan, 1, ASCC_FEATURE_AREA);
     return channel >= 0 ? run->value[1].raw + channel : NULL;
+}
+
+/* How a row of the boundary moves, spacings a time step. */
+static inline void ascc_wall_drift(const ascc_network_run *run, size_t row, double drift[3])
+{
+    for (int c = 0; c < 3; c++)
+        drift[c] = run->hierarchy->drift ? (double)run->hierarchy->drift[row * 4 + (size_t)c] : 0.0;
 }
 
 /* What the terms of a layer need at most. */

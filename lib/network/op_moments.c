@@ -3,7 +3,7 @@
  * SPDX-License-Identifier: MIT
  *
  * Of a fluid pair: 1, the unit vector to the neighbour, the speed of approach, the difference of velocities;
- * of a wall: 1, the unit vector, the speed of approach, its normal, each times its area where the boundary has
+ * of a wall: 1, the unit vector, the speed at which it and the particle approach, its normal, each times its area where the boundary has
  * that feature. Galilean invariant by construction.
  * Channels: [bump][number] of the fluid, then of walls. A particle is a neighbour of its own, at no distance.
  */
@@ -148,8 +148,8 @@ static void sum_row(const ascc_tile *tile, const ascc_term *term, int list, size
                                     run->hierarchy->place[0] + row * 4, (float)(1.0 / rows->radius),
                                     &pairs);
     run->tools->kernels->moments(&pairs, neighbor, count, vectors, stride, own, list, d,
-                                 list ? ascc_wall_areas(run) : NULL, stride, (size_t)filter.bumps,
-                                 sum);
+                                 list ? ascc_wall_areas(run) : NULL, stride,
+                                 list ? run->hierarchy->drift : NULL, (size_t)filter.bumps, sum);
 }
 
 /* The numbers of bumps, in a plane without those that it does not have. */
@@ -224,12 +224,15 @@ static void backward_pair(const ascc_reverse *pass, const ascc_term *term, int l
     const float *own = vectors_of(run, 0, &own_stride) + row * own_stride;
     const float *areas = list ? ascc_wall_areas(run) : NULL;
     const double area = areas ? (double)areas[j * stride] : 1.0;
-    double r[3], u[3] = {0.0, 0.0, 0.0}, relative[3] = {0.0, 0.0, 0.0}, q[8] = {area};
+    double r[3], u[3] = {0.0, 0.0, 0.0}, relative[3] = {0.0, 0.0, 0.0}, q[8] = {area},
+                 drift[3] = {0.0};
+    if (list)
+        ascc_wall_drift(run, j, drift);
     ascc_seen_displacement(run, rows, row, j, r);
     const double distance = sqrt(r[0] * r[0] + r[1] * r[1] + r[2] * r[2]);
     for (int32_t c = 0; c < d; c++) {
         u[c] = distance > 0.0 ? r[c] / distance : 0.0;
-        relative[c] = (list ? 0.0 : (double)vectors[c]) - (double)own[c];
+        relative[c] = (list ? drift[c] : (double)vectors[c]) - (double)own[c];
         q[1 + c] = area * u[c];
         q[4] -= area * u[c] * relative[c];
         q[5 + c] = list ? (double)vectors[c] : relative[c];

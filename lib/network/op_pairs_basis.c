@@ -313,6 +313,7 @@ static ascc_lines lines_of(const coefficients *c, int side)
     if (term->tensor[2 * side + 1]) {
         l.a = ascc_padded(plan->fluid_channels);
         l.motion = c->run->value[0].raw + ascc_plan_motion(plan, 0);
+        l.drift = side == WALLS ? c->run->hierarchy->drift : NULL;
     }
     return l;
 }
@@ -497,9 +498,12 @@ static void find_pair(const ascc_pair_reverse *q, int part, const bumps_at *at, 
     if (plan->output.term.tensor[part + 1]) {
         const size_t width = ascc_padded(plan->fluid_channels);
         const float *motion = p->run->value[0].raw + ascc_plan_motion(plan, 0);
+        double drift[3] = {0.0, 0.0, 0.0};
+        if (!a->both)
+            ascc_wall_drift(p->run, a->j, drift);
         for (int32_t c = 0; c < plan->dimension; c++)
             a->relative[c] = (double)motion[a->i * width + (size_t)c] -
-                             (a->both ? (double)motion[a->j * width + (size_t)c] : 0.0);
+                             (a->both ? (double)motion[a->j * width + (size_t)c] : drift[c]);
         a->approach = ascc_dot3(a->relative, a->u);
     }
     const double limit = ascc_output_limit(&plan->output);

@@ -5,9 +5,9 @@
  * (mass, momentum, walls, their normals), and the stencil reads them as seen from the mean motion u of the
  * corners around, so that it is Galilean invariant:
  *
- *     mass m, momentum p, walls b, normals n   ->   m, p - m u, b, n, -b u       u = sum w p / sum w m
+ *     mass m, momentum p, walls b, normals n   ->   m, p - m u, b, n, q - b u    u = sum w p / sum w m
  *
- * with w the binomial weights 1/4, 1/2, 1/4 along each axis.
+ * with w the binomial weights 1/4, 1/2, 1/4 along each axis, and q the walls' motions, 0 while they rest.
  */
 #include <math.h>
 #include <string.h>
@@ -233,7 +233,7 @@ static void gather_row(const ascc_network_run *run, const ascc_term *term, size_
     const int32_t d = run->plan->dimension, walls = 1 + d;
     const size_t a = ascc_padded(term->inputs), in = (size_t)term->inputs;
     const size_t step = (size_t)tap_inputs(run->plan, term), taps = taps_of(run->plan);
-    const float *source = ascc_term_source(run, term);
+    const float *source = ascc_term_source(run, term), *drift = run->value[term->source].drift;
     const uint32_t *tap = taps_around(run, term, row);
     float u[3] = {0.0f, 0.0f, 0.0f};
     if (reads_sums(term))
@@ -250,7 +250,9 @@ static void gather_row(const ascc_network_run *run, const ascc_term *term, size_
             column[c] = from[c];
         for (int32_t c = 0; reads_sums(term) && c < d; c++) {
             column[1 + c] = from[1 + c] - from[0] * u[c];
-            column[in + (size_t)c] = -(from[walls] * u[c]);
+            column[in + (size_t)c] =
+                drift ? drift[tap[t] * a + (size_t)(walls + 1 + c)] - from[walls] * u[c]
+                      : -(from[walls] * u[c]);
         }
     }
 }
@@ -381,5 +383,6 @@ const ascc_operation ascc_op_stencil = {.name = "stencil",
                                         .scratch = scratch,
                                         .columns = columns,
                                         .prepare = prepare,
+                                        .reads_drift = reads_sums,
                                         .forward = forward,
                                         .backward = backward};

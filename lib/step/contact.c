@@ -1,22 +1,10 @@
-/* Walls that nothing passes: motion through a wall ends at a distance from it, momentum goes to the wall.
- * SPDX-License-Identifier: MIT
- *
- * Each wall particle w with normal n stands for a disc. What moves from x0 to x1 meets it where it comes
- * closer to the disc's plane than the contact distance c, no farther from the axis than its radius:
- *
- *         x0 .                    the rest of the way goes on along the wall,
- *             \      n            from p to x1 + (c - (x1 - w).n) n,
- *      c ......p..+..^......      where it may meet the next one
- *               \    |
- *      ----------\---w------
- */
-#include "stage.h"
+/* Walls that nothing passes: motion through a wall ends at a distance from it, momentum goes to the wall
+ * (contact.h). SPDX-License-Identifier: MIT */
+#include "contact.h"
 
-#include <inttypes.h>
 #include <math.h>
+#include <string.h>
 
-/* Walls that one particle may meet in a step, one after the other: three make a corner. */
-#define MEETINGS 4
 /* Of a disc, in spacings: discs on a square lattice one spacing apart leave no gap. */
 #define DISC 0.71
 /* A particle this much closer than the contact distance, in spacings, is still held there. */
@@ -24,122 +12,161 @@
 /* Depths below this, in spacings, are rounding. */
 #define NOTHING 1e-9
 
-typedef struct contact_job {
-    const ascc_network_run *run;
-    const ascc_rows *rows; /* walls around the fluid */
-    const ascc_particles *p;
-    double time_step, distance, disc_square, slack, nothing;
-    ascc_advance *advance;
-    int64_t *wall;
-    atomic_size_t bad; /* 1 + first set row that fails */
-} contact_job;
+/* ---- One way and one wall ---- */
 
-typedef struct meeting {
-    double when;   /* share of the way, > 1 = none */
-    double push;   /* along the wall's normal, at the end of the way */
-    uint32_t wall; /* in the step's own order, which the host's rows do not decide */
-} meeting;
-
-/* Where the way from `from` to `to` meets this wall; meeting.when > 1 if it does not. */
-static meeting meet(const contact_job *job, uint32_t wall, const double *from, const double *to)
+/* Where a wall is when so much of the step has passed. */
+static void wall_at(const ascc_contact *job, size_t row, double when, double at[3])
 {
-    const size_t d = (size_t)job->p->dimension,
-                 row = ascc_hierarchy_wall_row(job->run->hierarchy, wall);
-    const double *w = job->p->wall_position + row * d, *n = job->p->wall_normal + row * d;
-    meeting m = {.when = 2.0, .wall = wall};
-    double begin = 0.0, end = 0.0, square = 0.0, along = 0.0;
+    const ascc_step_state *state = job->state;
+    const size_t d = (size_t)state->particles->dimension;
+    const double *begin = state->particles->wall_position + row * d;
+    const double *end = state->advance.wall + row * d;
+    for (size_t c = 0; c < d; c++)
+        at[c] = begin[c] + when * (end[c] - begin[c]);
+}
+
+/* The first that is met, in an order that is not the host's. */
+static bool comes_first(const ascc_meeting *a, const ascc_meeting *b)
+{
+    if (a->share != b->share)
+        return a->share < b->share;
+    return a->push > b->push || (a->push == b->push && a->wall < b->wall);
+}
+
+void ascc_contact_try(const ascc_contact *job, const ascc_way *way, uint32_t wall,
+                      ascc_meeting *first)
+{
+    const ascc_step_state *state = job->state;
+    const ascc_particles *p = state->particles;
+    const size_t d = (size_t)p->dimension, row = ascc_hierarchy_wall_row(&state->hierarchy, wall);
+    const double *n = p->wall_normal + row * d, *w1 = state->advance.wall + row * d;
+    double w0[3], begin = 0.0, end = 0.0, square = 0.0, along = 0.0;
+    wall_at(job, row, way->when, w0);
     for (size_t c = 0; c < d; c++) {
-        begin += (from[c] - w[c]) * n[c];
-        end += (to[c] - w[c]) * n[c];
+        begin += (way->from[c] - w0[c]) * n[c];
+        end += (way->to[c] - w1[c]) * n[c];
     }
     if (!(end < job->distance - job->nothing && end < begin - job->nothing &&
           begin > job->distance - job->slack))
-        return m;
-    const double when = begin > job->distance ? (begin - job->distance) / (begin - end) : 0.0;
+        return;
+    ascc_meeting m = {.wall = wall};
+    m.share = begin > job->distance ? (begin - job->distance) / (begin - end) : 0.0;
+    m.push = (begin < job->distance ? begin : job->distance) - end;
     for (size_t c = 0; c < d; c++) {
-        const double at = from[c] + when * (to[c] - from[c]) - w[c];
+        const double at = way->from[c] + m.share * (way->to[c] - way->from[c]) -
+                          (w0[c] + m.share * (w1[c] - w0[c]));
         square += at * at;
         along += at * n[c];
+        m.normal[c] = n[c];
     }
-    if (square - along * along > job->disc_square)
-        return m;
-    m.when = when;
-    m.push = (begin < job->distance ? begin : job->distance) - end;
-    return m;
+    if (square - along * along <= job->disc * job->disc && comes_first(&m, first))
+        *first = m;
 }
 
-/* The first wall on the way; of walls met at once the one that pushes most, then the one that comes first. */
-static meeting first_meeting(const contact_job *job, size_t i, const double *from, const double *to)
+/* Momentum that takes the particle from its place to the end of its way in a step; the wall has the rest. */
+static bool end_at(const ascc_contact *job, size_t row, size_t wall, const double *to)
 {
-    const uint32_t *neighbor = job->rows->neighbor + job->rows->start[i];
-    meeting first = {.when = 2.0};
-    for (size_t k = 0; k < job->rows->count[i]; k++) {
-        const meeting m = meet(job, neighbor[k], from, to);
-        if (m.when < first.when ||
-            (m.when <= 1.0 && m.when == first.when &&
-             (m.push > first.push || (m.push == first.push && m.wall < first.wall))))
-            first = m;
-    }
-    return first;
-}
-
-/* Momentum that takes the particle from its place to `to` in a step; the wall has the rest. */
-static bool end_at(contact_job *job, size_t row, size_t wall, const double *to)
-{
-    const ascc_particles *p = job->p;
+    ascc_step_state *state = job->state;
+    const ascc_particles *p = state->particles;
     const size_t d = (size_t)p->dimension;
+    const double dt = state->motion->time_step;
     for (size_t c = 0; c < d; c++) {
         const size_t k = row * d + c;
-        const double velocity = (to[c] - p->position[k]) / job->time_step;
+        const double velocity = (to[c] - p->position[k]) / dt;
         int64_t momentum;
         if (!ascc_to_quanta(p->mass[row] * velocity, p->quantum, &momentum) ||
             momentum > ASCC_MOMENTUM_LIMIT || momentum < -ASCC_MOMENTUM_LIMIT)
             return false;
-        const int64_t before = __atomic_fetch_add(
-            &job->wall[wall * d + c], job->advance->momentum[k] - momentum, __ATOMIC_RELAXED);
+        const int64_t before =
+            __atomic_fetch_add(&state->impulses.wall[wall * d + c],
+                               state->advance.momentum[k] - momentum, __ATOMIC_RELAXED);
         if (before >= ASCC_WALL_LIMIT || before <= -ASCC_WALL_LIMIT)
             return false;
-        job->advance->momentum[k] = momentum;
-        job->advance->position[k] =
-            p->position[k] + job->time_step * ((double)momentum * p->quantum / p->mass[row]);
+        state->advance.momentum[k] = momentum;
+        state->advance.position[k] =
+            p->position[k] + dt * ((double)momentum * p->quantum / p->mass[row]);
     }
     return true;
 }
 
-static bool hold_row(contact_job *job, size_t i)
+bool ascc_contact_bend(const ascc_contact *job, size_t row, const ascc_meeting *m, ascc_way *way)
 {
-    const size_t d = (size_t)job->p->dimension;
-    const ascc_hierarchy *h = job->run->hierarchy;
-    const size_t row = ascc_hierarchy_host_row(h, ASCC_SET_FLUID, i);
-    double from[3], to[3];
+    const ascc_step_state *state = job->state;
+    const size_t d = (size_t)state->particles->dimension;
+    const size_t wall = ascc_hierarchy_wall_row(&state->hierarchy, m->wall);
+    const bool last = ++way->meetings == ASCC_MEETINGS;
+    double now[3];
+    way->when += m->share * (1.0 - way->when);
+    wall_at(job, wall, way->when, now);
     for (size_t c = 0; c < d; c++) {
-        from[c] = job->p->position[row * d + c];
-        to[c] = job->advance->position[row * d + c];
+        way->from[c] += m->share * (way->to[c] - way->from[c]);
+        way->to[c] = last ? way->from[c] + (state->advance.wall[wall * d + c] - now[c])
+                          : way->to[c] + m->push * m->normal[c];
     }
-    for (int n = 0; n < MEETINGS; n++) {
-        const meeting m = first_meeting(job, i, from, to);
-        if (m.when > 1.0)
-            break;
-        const size_t wall = ascc_hierarchy_wall_row(job->run->hierarchy, m.wall);
-        const double *normal = job->p->wall_normal + wall * d;
-        for (size_t c = 0; c < d; c++) {
-            from[c] += m.when * (to[c] - from[c]);
-            to[c] = n + 1 < MEETINGS ? to[c] + m.push * normal[c] : from[c];
+    return end_at(job, row, wall, way->to);
+}
+
+/* ---- All ways, with the walls of the lists ---- */
+
+typedef struct near_job {
+    ascc_contact *contact;
+    ascc_way *way;    /* [set rows] */
+    uint8_t *is_left; /* [set rows] 1 = the lists may lack walls of what is left of the way */
+} near_job;
+
+/* Do the lists have all walls that this way may meet? */
+static bool is_covered(const ascc_contact *job, size_t i, const ascc_way *way)
+{
+    const ascc_hierarchy *h = &job->state->hierarchy;
+    const size_t d = (size_t)job->state->particles->dimension;
+    double from = 0.0, to = 0.0;
+    for (size_t c = 0; c < d; c++) {
+        const double seen =
+            (double)h->set[ASCC_SET_FLUID].position[c][i] * h->scale.unit / job->state->length_unit;
+        from += (way->from[c] - seen) * (way->from[c] - seen);
+        to += (way->to[c] - seen) * (way->to[c] - seen);
+    }
+    return sqrt(fmax(from, to)) + job->near <= job->reach;
+}
+
+/* Follows a row's way to its end, or to where the lists no longer tell; false where that cannot be held. */
+static bool follow(near_job *job, size_t i)
+{
+    ascc_contact *contact = job->contact;
+    const ascc_step_state *state = contact->state;
+    const ascc_particles *p = state->particles;
+    const size_t d = (size_t)p->dimension;
+    const size_t row = ascc_hierarchy_host_row(&state->hierarchy, ASCC_SET_FLUID, i);
+    const uint32_t *neighbor = contact->rows->neighbor + contact->rows->start[i];
+    ascc_way *way = &job->way[i];
+    *way = (ascc_way){.meetings = 0};
+    for (size_t c = 0; c < d; c++) {
+        way->from[c] = p->position[row * d + c];
+        way->to[c] = state->advance.position[row * d + c];
+    }
+    while (way->meetings < ASCC_MEETINGS) {
+        if (!is_covered(contact, i, way)) {
+            job->is_left[i] = 1;
+            return true;
         }
-        if (!end_at(job, row, wall, to))
+        ascc_meeting first = ascc_no_meeting();
+        for (size_t k = 0; k < contact->rows->count[i]; k++)
+            ascc_contact_try(contact, way, neighbor[k], &first);
+        if (first.share > 1.0)
+            return true;
+        if (!ascc_contact_bend(contact, row, &first, way))
             return false;
     }
     return true;
 }
 
-static void hold_rows(void *data, size_t begin, size_t end, int32_t slot)
+static void follow_rows(void *data, size_t begin, size_t end, int32_t slot)
 {
     (void)slot;
-    contact_job *job = data;
+    near_job *job = data;
     for (size_t i = begin; i < end; i++)
-        if (!ascc_hierarchy_is_idle(job->run->hierarchy, i) && job->rows->count[i] &&
-            !hold_row(job, i)) {
-            ascc_note_first(&job->bad, i);
+        if (!ascc_hierarchy_is_idle(&job->contact->state->hierarchy, i) && !follow(job, i)) {
+            ascc_note_first(&job->contact->bad, i);
             return;
         }
 }
@@ -151,30 +178,69 @@ static const ascc_rows *walls_around(const ascc_network_run *run)
                                            : &run->rows[run->network->relaxation_key[1]];
 }
 
+static ascc_contact open_contact(ascc_step_state *state, double distance)
+{
+    const double spacing = state->network->plan->spacing / state->length_unit;
+    const ascc_rows *rows = walls_around(&state->run);
+    ascc_contact contact = {.state = state,
+                            .rows = rows,
+                            .distance = distance / state->length_unit,
+                            .disc = DISC * spacing,
+                            .slack = SLACK * spacing,
+                            .nothing = NOTHING * spacing};
+    contact.near = hypot(contact.distance, contact.disc) + state->advance.wall_way;
+    contact.reach =
+        rows->limit ? 0.0 : rows->radius * state->hierarchy.scale.unit / state->length_unit;
+    return contact;
+}
+
+/* Ways beyond the lists, in the order of the set. */
+static ascc_status follow_far(near_job *job, size_t count)
+{
+    ascc_contact *contact = job->contact;
+    const ascc_search_tools *tools = &contact->state->tools;
+    size_t left = 0;
+    for (size_t i = 0; i < count; i++)
+        left += job->is_left[i];
+    if (!left)
+        return ASCC_OK;
+    size_t *row = ascc_arena_lend(tools->arena, left, sizeof *row);
+    if (!row)
+        return ascc_fail(tools->message, ASCC_ERROR_MEMORY, "no memory for contact");
+    left = 0;
+    for (size_t i = 0; i < count; i++)
+        if (job->is_left[i]) {
+            row[left] = i;
+            job->way[left++] = job->way[i];
+        }
+    return ascc_contact_far(contact, job->way, row, left);
+}
+
 ascc_status ascc_stage_contact(ascc_step_state *state)
 {
     const ascc_plan *plan = state->network->plan;
-    const ascc_particles *p = state->particles;
+    const ascc_search_tools *tools = &state->tools;
     const double distance = fmax(plan->output.contact, plan->relaxation.contact);
-    if (!(distance > 0.0) || p->fluid_count == 0)
+    const size_t count = state->hierarchy.set[ASCC_SET_FLUID].count;
+    if (!(distance > 0.0) || state->particles->fluid_count == 0 ||
+        state->hierarchy.set[ASCC_SET_BOUNDARY].count == 0)
         return ASCC_OK;
-    const double spacing = plan->spacing / state->length_unit;
-    contact_job job = {.run = &state->run,
-                       .rows = walls_around(&state->run),
-                       .p = p,
-                       .time_step = state->motion->time_step,
-                       .distance = distance / state->length_unit,
-                       .disc_square = DISC * DISC * spacing * spacing,
-                       .slack = SLACK * spacing,
-                       .nothing = NOTHING * spacing,
-                       .advance = &state->advance,
-                       .wall = state->impulses.wall};
-    ascc_workers_run(state->tools.workers, state->hierarchy.set[ASCC_SET_FLUID].count, 256,
-                     hold_rows, &job);
-    const size_t bad = atomic_load(&job.bad);
-    if (bad)
-        return ascc_fail(state->tools.message, ASCC_ERROR_RANGE,
+    ascc_contact contact = open_contact(state, distance);
+    const ascc_arena_mark mark = ascc_arena_mark_of(tools->arena);
+    near_job job = {&contact, ascc_arena_lend(tools->arena, count, sizeof *job.way),
+                    ascc_arena_lend(tools->arena, count, 1)};
+    if (!job.way || !job.is_left)
+        return ascc_fail(tools->message, ASCC_ERROR_MEMORY, "no memory for contact");
+    memset(job.is_left, 0, count); /* idle rows too */
+    ascc_workers_run(tools->workers, count, 256, follow_rows, &job);
+    ascc_status status = ASCC_OK;
+    if (!atomic_load(&contact.bad))
+        status = follow_far(&job, count);
+    ascc_arena_return(tools->arena, mark);
+    const size_t bad = atomic_load(&contact.bad);
+    if (status == ASCC_OK && bad)
+        return ascc_fail(tools->message, ASCC_ERROR_RANGE,
                          "fluid row %zu: a wall gives it a momentum too large to hold",
                          ascc_hierarchy_host_row(&state->hierarchy, ASCC_SET_FLUID, bad - 1));
-    return ASCC_OK;
+    return status;
 }

@@ -31,6 +31,10 @@ typedef struct relaxation {
     float inverse_support;    /* of a unit */
     int32_t *low;             /* positions [count][4] */
     const float *wall_volume; /* of wall rows */
+    /* Of walls that move: where they end, if the network saw them elsewhere, and, if sweeps are on velocities,
+     * how far they go, supports; and what that adds to each row. Else NULL. */
+    int32_t *wall_low[3];
+    float *wall_move[3], *inflow;
     ascc_pair_sum sum;
     /* What the pairs are: */
     size_t *start, *end; /* [count + 1], [count] */
@@ -188,7 +192,8 @@ static void find_directions(const relaxation *r, size_t i, bool walls, const uin
                             size_t count, const ascc_pairs *pairs)
 {
     const ascc_kernels *kernels = r->state->tools.kernels;
-    int32_t *const *wall = r->state->hierarchy.set[ASCC_SET_BOUNDARY].low;
+    int32_t *const *seen = r->state->hierarchy.set[ASCC_SET_BOUNDARY].low;
+    int32_t *const *wall = r->wall_low[0] ? r->wall_low : seen;
     const ascc_coordinates points = {wall[0], wall[1], wall[2]};
     const int32_t *at = r->low + i * 4;
     if (walls)
@@ -216,6 +221,18 @@ static void look(relaxation *r, size_t i, float *scratch, float sum[8])
         at + kernels->keep_gradients(&pairs, neighbor, count, (uint32_t)i, r->neighbor + at, g);
 }
 
+/* What walls that approach row i add to its divergence, from the gradients of its pairs. */
+static float inflow_of(const relaxation *r, const ascc_pairs *pairs, const uint32_t *neighbor,
+                       size_t count)
+{
+    float sum = 0.0f;
+    for (size_t k = 0; k < count; k++)
+        sum -= pairs->x[k] * r->wall_move[0][neighbor[k]] +
+               pairs->y[k] * r->wall_move[1][neighbor[k]] +
+               pairs->z[k] * r->wall_move[2][neighbor[k]];
+    return sum;
+}
+
 static void look_at_walls(const relaxation *r, size_t i, float *scratch, float sum[8])
 {
     const uint32_t *neighbor = r->wall_rows->neighbor + r->wall_rows->start[i];
@@ -227,6 +244,8 @@ static void look_at_walls(const relaxation *r, size_t i, float *scratch, float s
     find_directions(r, i, true, neighbor, count, &pairs);
     r->state->tools.kernels->spline(&pairs, neighbor, count, (float)r->constants->amount,
                                     r->wall_volume, sum);
+    if (r->inflow)
+        r->inflow[i] = inflow_of(r, &pairs, neighbor, count);
 }
 
 /* Of unequal masses: a pair pushes row i by twice the other's share of both masses. Returns D. */
@@ -259,6 +278,9 @@ static void find_divergence(relaxation *r, size_t begin, size_t end)
         if (r->excess[i] < -ASCC_SURFACE)
             r->response[i] = 0.0f;
     r->state->tools.kernels->divergence(&pairs, begin, end, r->own, r->move, r->excess);
+    for (size_t i = begin; r->inflow && i < end; i++)
+        if (r->wall_rows->count[i])
+            r->excess[i] += r->inflow[i];
 }
 
 /* A row without pairs, which stays as it is. */
@@ -308,9 +330,52 @@ static bool lend_volumes(relaxation *r)
     const size_t count = h->set[ASCC_SET_BOUNDARY].count;
     float *volume = ascc_arena_lend(r->state->tools.arena, count, sizeof *volume);
     for (size_t i = 0; volume && i < count; i++)
-        volume[i] = r->state->walls->volume[ascc_hierarchy_wall_row(h, i)];
+        volume[i] = r->state->wall_volume[ascc_hierarchy_wall_row(h, i)];
     r->wall_volume = volume;
     return volume != NULL;
+}
+
+/* Where walls end, of which the network saw where they were. */
+static bool lend_wall_places(relaxation *r)
+{
+    const ascc_hierarchy *h = &r->state->hierarchy;
+    const size_t count = h->set[ASCC_SET_BOUNDARY].count,
+                 d = (size_t)r->state->particles->dimension;
+    if (!r->state->advance.walls_move || r->state->motion->advection != ASCC_ADVECT_NONE)
+        return true;
+    for (size_t c = 0; c < 3; c++) {
+        r->wall_low[c] = ascc_arena_lend(r->state->tools.arena, count, sizeof(int32_t));
+        if (!r->wall_low[c])
+            return false;
+        for (size_t i = 0; i < count; i++) {
+            const double *wall = r->state->advance.wall + ascc_hierarchy_wall_row(h, i) * d;
+            int64_t at = h->set[ASCC_SET_BOUNDARY].position[c][i];
+            if (c < d)
+                (void)ascc_scale_apply(&h->scale, wall[c] * r->state->length_unit, &at);
+            r->wall_low[c][i] = (int32_t)(uint32_t)(uint64_t)at;
+        }
+    }
+    return true;
+}
+
+/* How far walls go in the step, if sweeps are on velocities. */
+static bool lend_wall_moves(relaxation *r)
+{
+    const ascc_hierarchy *h = &r->state->hierarchy;
+    const ascc_particles *p = r->state->particles;
+    const size_t count = h->set[ASCC_SET_BOUNDARY].count, d = (size_t)p->dimension;
+    const double unit = r->state->motion->time_step * r->state->length_unit / r->constants->support;
+    if (!r->slows || !r->state->advance.walls_move)
+        return true;
+    r->inflow = ascc_arena_lend(r->state->tools.arena, r->count, sizeof *r->inflow);
+    if (!r->inflow || !lend_vector(r->state->tools.arena, r->wall_move, count))
+        return false;
+    for (size_t i = 0; i < count; i++)
+        for (size_t c = 0; c < 3; c++)
+            r->wall_move[c][i] =
+                c < d ? (float)(p->wall_velocity[ascc_hierarchy_wall_row(h, i) * d + c] * unit)
+                      : 0.0f;
+    return true;
 }
 
 /* Everything that sweeps read. slows: of velocities. */
@@ -331,13 +396,12 @@ static ascc_status open_relaxation(relaxation *r, ascc_step_state *state, bool s
                      .slows = slows};
     if (r->count > INT32_MAX)
         return ascc_fail(tools->message, ASCC_ERROR_RANGE, "more than 2^31 particles to relax");
-    ascc_status status = ascc_wall_volumes_update(state->walls, tools, state->particles,
-                                                  constants->support / state->length_unit);
+    ascc_status status = ascc_find_wall_volumes(state, constants->support / state->length_unit);
     if (status == ASCC_OK)
         status = ascc_pair_sum_open(&r->sum, run, ASCC_SET_FLUID, state->particles->mass, 4);
     if (status != ASCC_OK)
         return status;
-    if (!lend_volumes(r) || !lend_memory(r))
+    if (!lend_volumes(r) || !lend_wall_places(r) || !lend_wall_moves(r) || !lend_memory(r))
         return ascc_fail(tools->message, ASCC_ERROR_MEMORY, "no memory for the relaxation");
     ascc_workers_run(tools->workers, r->count, 4 * ROWS, find_places, r);
     const size_t bad = atomic_load(&r->bad);

@@ -37,6 +37,13 @@ static double whole_area(const ascc_plan *plan)
     return plan->dimension == 2 ? 0.75 * support : 7.0 * pi / 40.0 * support * support;
 }
 
+/* What makes spacings a time step of the host's velocities. */
+static double motion_factor(const ascc_step_state *state)
+{
+    const ascc_plan *plan = state->network->plan;
+    return state->length_unit / state->time_unit * plan->time_step / plan->spacing;
+}
+
 /* Features of particles in the host's order, of walls that are near; vectors in metres. */
 static bool lend_features(ascc_step_state *state, const uint8_t *near)
 {
@@ -49,8 +56,7 @@ static bool lend_features(ascc_step_state *state, const uint8_t *near)
     state->boundary_features = ascc_arena_lend(arena, p->boundary_count, wall * sizeof(float));
     if (!state->fluid_features || !state->boundary_features)
         return false;
-    const double unit = state->length_unit / state->time_unit;
-    const double motion = unit * plan->time_step / plan->spacing;
+    const double unit = state->length_unit / state->time_unit, motion = motion_factor(state);
     const double whole = whole_area(plan);
     double gravity[3] = {0.0, 0.0, 0.0};
     for (size_t c = 0; c < d; c++)
@@ -62,7 +68,7 @@ static bool lend_features(ascc_step_state *state, const uint8_t *near)
     for (size_t i = 0; i < p->boundary_count; i++) {
         if (near && !near[i])
             continue;
-        const double area = whole > 0.0 ? whole * (double)state->walls->volume[i] : 1.0;
+        const double area = whole > 0.0 ? whole * (double)state->wall_volume[i] : 1.0;
         features_of(plan, plan->boundary_features, plan->boundary_feature_count,
                     p->wall_normal + i * d, NULL, area, 0.0, gravity, area,
                     state->boundary_features + i * wall);
@@ -76,8 +82,7 @@ static ascc_status find_areas(ascc_step_state *state)
     const ascc_plan *plan = state->network->plan;
     if (ascc_plan_feature(plan, 1, ASCC_FEATURE_AREA) < 0)
         return ASCC_OK;
-    return ascc_wall_volumes_update(state->walls, &state->tools, state->particles,
-                                    ascc_plan_wall_support(plan) / state->length_unit);
+    return ascc_find_wall_volumes(state, ascc_plan_wall_support(plan) / state->length_unit);
 }
 
 typedef struct scale_job {
@@ -128,7 +133,9 @@ ascc_status ascc_stage_sight(ascc_step_state *state)
                         .boundary_count = p->boundary_count,
                         .velocity = state->advance.velocity,
                         .mass = p->mass,
-                        .normal = p->wall_normal};
+                        .normal = p->wall_normal,
+                        .wall_velocity = state->advance.walls_move ? p->wall_velocity : NULL,
+                        .motion = motion_factor(state)};
     ascc_status status = find_areas(state);
     if (status != ASCC_OK)
         return status;
@@ -138,7 +145,8 @@ ascc_status ascc_stage_sight(ascc_step_state *state)
     scene.near = near;
     const ascc_arena_mark before_scene = ascc_arena_mark_of(tools->arena);
     scene.fluid = scaled(tools, state->advance.seen, p->fluid_count * d, state->length_unit);
-    scene.boundary = scaled(tools, p->wall_position, p->boundary_count * d, state->length_unit);
+    scene.boundary =
+        scaled(tools, ascc_walls_seen(state), p->boundary_count * d, state->length_unit);
     if (!room || !scene.fluid || !scene.boundary)
         return ascc_fail(tools->message, ASCC_ERROR_MEMORY, "no memory for the features");
     status = ascc_hierarchy_build(&state->hierarchy, tools, state->network->plan, &scene);

@@ -30,6 +30,8 @@ typedef struct ascc_advance {
     int64_t *external; /* impulse of gravity and acceleration, quanta */
     /* Where walls end, [boundary count][dimension]: the particles' own array while none moves. */
     const double *wall;
+    const double *wall_velocity; /* as it was when the step began; NULL: all rest */
+    double wall_way;             /* the farthest that one goes */
     bool walls_move;
 } ascc_advance;
 
@@ -68,7 +70,7 @@ typedef struct ascc_step_state {
     double length_unit, time_unit; /* m and s of the model in the host's unit and second */
     size_t *expected;              /* of the network's neighbour lists */
     ascc_status (*engine)(struct ascc_step_state *state); /* engine.h */
-    ascc_wall_volumes *walls;
+    ascc_wall_volumes *walls;                             /* kept while they rest */
     ascc_search_tools tools;
     ascc_step_statistics *statistics; /* also the times of stages */
     double since;                     /* when the stage under way began, s */
@@ -81,6 +83,7 @@ typedef struct ascc_step_state {
     ascc_hierarchy hierarchy;
     ascc_network_run run;
     ascc_relaxed relaxed;
+    const float *wall_volume; /* of the host's boundary rows, where they end */
 } ascc_step_state;
 
 /* What a step of this length does of a displacement that the network gives for the model's: as much as an
@@ -91,6 +94,16 @@ static inline double ascc_step_share(const ascc_step_state *state)
         state->motion->time_step * state->time_unit / state->network->plan->time_step;
     return steps * steps;
 }
+
+/* Where the network sees walls, [boundary count][dimension]: moved on if the fluid is. */
+static inline const double *ascc_walls_seen(const ascc_step_state *state)
+{
+    return state->motion->advection == ASCC_ADVECT_NONE ? state->particles->wall_position
+                                                        : state->advance.wall;
+}
+
+/* What walls stand for where they end: state->wall_volume. errors: MEMORY, RANGE, LIMIT. */
+ascc_status ascc_find_wall_volumes(ascc_step_state *state, double support);
 
 typedef ascc_status (*ascc_stage)(ascc_step_state *state);
 

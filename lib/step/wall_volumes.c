@@ -1,15 +1,21 @@
 /* Akinci volumes of wall points. SPDX-License-Identifier: MIT */
 #include "wall_volumes.h"
 
+#include <math.h>
 #include <string.h>
 
 #define MAX_NEIGHBORS 65536
 
-static bool are_known(const ascc_wall_volumes *walls, const ascc_particles *p, double support)
+/* The walls' positions, [count][dimension]. */
+typedef struct places {
+    const double *at;
+    size_t count, d;
+} places;
+
+static bool are_known(const ascc_wall_volumes *walls, const places *p, double support)
 {
-    const size_t numbers = p->boundary_count * (size_t)p->dimension;
-    return walls->count == p->boundary_count && walls->support == support &&
-           memcmp(walls->position, p->wall_position, numbers * sizeof *walls->position) == 0;
+    return walls->count == p->count && walls->support == support &&
+           memcmp(walls->position, p->at, p->count * p->d * sizeof *p->at) == 0;
 }
 
 /* The cubic spline of kernels.h's `spline`, of a squared distance in supports. */
@@ -50,11 +56,11 @@ static void find_volumes(void *data, size_t begin, size_t end, int32_t slot)
 }
 
 /* The walls as points in the order of cells, so that sums do not depend on the host's order. */
-static ascc_status sort_walls(const ascc_search_tools *tools, const ascc_particles *p,
+static ascc_status sort_walls(const ascc_search_tools *tools, const places *p,
                               const ascc_scale *scale, double radius, ascc_points *points,
                               uint32_t *order, ascc_extent *extent)
 {
-    const size_t d = (size_t)p->dimension, count = p->boundary_count;
+    const size_t d = p->d, count = p->count;
     ascc_points raw;
     if (!ascc_points_take(&raw, tools->arena, count) ||
         !ascc_points_take(points, tools->arena, count))
@@ -62,7 +68,7 @@ static ascc_status sort_walls(const ascc_search_tools *tools, const ascc_particl
     for (size_t i = 0; i < count; i++) {
         int64_t at[3] = {0};
         for (size_t c = 0; c < d; c++)
-            if (!ascc_scale_apply(scale, p->wall_position[i * d + c], &at[c]))
+            if (!ascc_scale_apply(scale, p->at[i * d + c], &at[c]))
                 return ascc_fail(tools->message, ASCC_ERROR_RANGE,
                                  "boundary row %zu is too far from the origin for the relaxation",
                                  i);
@@ -79,8 +85,8 @@ static ascc_status sort_walls(const ascc_search_tools *tools, const ascc_particl
     return status;
 }
 
-static ascc_status make_volumes(float *volume, const ascc_search_tools *tools,
-                                const ascc_particles *p, double support)
+static ascc_status make_volumes(float *volume, const ascc_search_tools *tools, const places *p,
+                                double support)
 {
     const ascc_scale scale = ascc_scale_for_radius(support);
     ascc_points points;
@@ -93,10 +99,9 @@ static ascc_status make_volumes(float *volume, const ascc_search_tools *tools,
                       .radius = support * scale.inverse,
                       .same = true,
                       .max_neighbors = MAX_NEIGHBORS};
-    uint32_t *order = ascc_arena_take(tools->arena, p->boundary_count, sizeof *order);
+    uint32_t *order = ascc_arena_take(tools->arena, p->count, sizeof *order);
     if (!order)
-        return ascc_fail(tools->message, ASCC_ERROR_MEMORY, "no memory for %zu walls",
-                         p->boundary_count);
+        return ascc_fail(tools->message, ASCC_ERROR_MEMORY, "no memory for %zu walls", p->count);
     ascc_status status = sort_walls(tools, p, &scale, rows.radius, &points, order, &extent);
     if (status == ASCC_OK)
         status = ascc_grid_build(&grid, tools, &points, &extent, rows.radius, true);
@@ -106,15 +111,17 @@ static ascc_status make_volumes(float *volume, const ascc_search_tools *tools,
         status = ascc_rows_make(&rows, tools, NULL);
     volumes_job job = {&rows, order, volume};
     if (status == ASCC_OK)
-        ascc_workers_run(tools->workers, p->boundary_count, 1024, find_volumes, &job);
+        ascc_workers_run(tools->workers, p->count, 1024, find_volumes, &job);
     return status;
 }
 
 ascc_status ascc_wall_volumes_update(ascc_wall_volumes *walls, const ascc_search_tools *tools,
-                                     const ascc_particles *p, double support)
+                                     const double *position, size_t count, int32_t dimension,
+                                     double support)
 {
-    const size_t count = p->boundary_count, numbers = count * (size_t)p->dimension;
-    if (count == 0 || are_known(walls, p, support))
+    const places p = {position, count, (size_t)dimension};
+    const size_t numbers = count * p.d;
+    if (count == 0 || are_known(walls, &p, support))
         return ASCC_OK;
     walls->count = 0;
     if (!ascc_grow(walls->allocator, (void **)&walls->volume, &walls->volume_capacity, count,
@@ -122,10 +129,10 @@ ascc_status ascc_wall_volumes_update(ascc_wall_volumes *walls, const ascc_search
         !ascc_grow(walls->allocator, (void **)&walls->position, &walls->position_capacity, numbers,
                    sizeof *walls->position))
         return ascc_fail(tools->message, ASCC_ERROR_MEMORY, "no memory for %zu walls", count);
-    const ascc_status status = make_volumes(walls->volume, tools, p, support);
+    const ascc_status status = make_volumes(walls->volume, tools, &p, support);
     if (status != ASCC_OK)
         return status;
-    memcpy(walls->position, p->wall_position, numbers * sizeof *walls->position);
+    memcpy(walls->position, position, numbers * sizeof *walls->position);
     walls->count = count;
     walls->support = support;
     return ASCC_OK;

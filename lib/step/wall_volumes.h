@@ -4,7 +4,6 @@
 #define ASCC_WALL_VOLUMES_H
 
 #include "points/neighbors.h"
-#include "points/particles.h"
 
 /* Kept from step to step, made anew when walls are others. */
 typedef struct ascc_wall_volumes {
@@ -15,10 +14,11 @@ typedef struct ascc_wall_volumes {
     double support; /* likewise, in the host's unit */
 } ascc_wall_volumes;
 
-/* Volumes of the set's walls: 1 / sum of w over all walls within the support. errors: MEMORY, RANGE,
- * LIMIT. */
+/* Volumes of walls at these positions [count][dimension]: 1 / sum of w over all walls within the support.
+ * errors: MEMORY, RANGE, LIMIT. */
 ascc_status ascc_wall_volumes_update(ascc_wall_volumes *walls, const ascc_search_tools *tools,
-                                     const ascc_particles *particles, double support);
+                                     const double *position, size_t count, int32_t dimension,
+                                     double support);
 void ascc_wall_volumes_close(ascc_wall_volumes *walls);
 
 #endif

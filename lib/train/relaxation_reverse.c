@@ -49,6 +49,7 @@ typedef struct reverse {
     double *push;        /* [sweep][row][3] by the pressure before it */
     double *change;      /* [sweep][row] */
     double repulsion;
+    const double *moving; /* velocities of the host's walls, or NULL: all rest */
     /* Gradients: */
     double *by_push;     /* [row][3] */
     double *by_pressure; /* [row] */
@@ -131,9 +132,9 @@ static double look_around(reverse *r, size_t i)
                 continue;
             if (list) {
                 const size_t row = ascc_hierarchy_wall_row(h, j);
-                volume = (double)state->walls->volume[row];
+                volume = (double)state->wall_volume[row];
                 for (size_t c = 0; c < r->d; c++)
-                    place[c] = state->particles->wall_position[row * r->d + c] * r->unit;
+                    place[c] = state->advance.wall[row * r->d + c] * r->unit;
             }
             if (!look_at(r, r->place + i * 3, list ? place : r->place + j * 3, volume, n))
                 continue;
@@ -246,6 +247,42 @@ static void sweep(reverse *r)
 }
 
 /* ---- Back ---- */
+
+/* How far a neighbour that is a wall goes in the step, supports. */
+static void wall_move(const reverse *r, const neighbor *n, double move[3])
+{
+    const size_t row = ascc_hierarchy_wall_row(&r->state->hierarchy, n->at);
+    for (size_t c = 0; c < 3; c++)
+        move[c] =
+            c < r->d ? r->moving[row * r->d + c] * r->state->motion->time_step * r->unit : 0.0;
+}
+
+/* What walls that move take from divergences. */
+static void add_inflow(reverse *r)
+{
+    for (size_t i = 0; r->moving && i < r->count; i++)
+        for (size_t k = r->start[i]; k < r->start[i + 1]; k++) {
+            double move[3];
+            if (r->pair[k].fluid)
+                continue;
+            wall_move(r, &r->pair[k], move);
+            r->excess[i] -= dot(r->pair[k].g, move);
+        }
+}
+
+/* The gradients of pairs that this has. */
+static void pass_inflow(reverse *r)
+{
+    for (size_t i = 0; r->moving && i < r->count; i++)
+        for (size_t k = r->start[i]; k < r->start[i + 1]; k++) {
+            double move[3];
+            if (r->pair[k].fluid)
+                continue;
+            wall_move(r, &r->pair[k], move);
+            for (int c = 0; c < 3; c++)
+                r->pair[k].by_g[c] -= r->by_excess[i] * move[c];
+        }
+}
 
 /* Gradients of pairs that a divergence of these moves has. */
 static void pass_divergence(reverse *r, const double *move, const double *by_change)
@@ -514,11 +551,14 @@ static ascc_status divergence_back(const ascc_step_state *state, ascc_arena *are
         if (r.excess[i] < -(double)ASCC_SURFACE)
             r.response[i] = 0.0;
     divergence(&r, move, r.excess);
+    r.moving = state->advance.wall_velocity;
+    add_inflow(&r);
     sweep(&r);
     apply_back(&r, by);
     for (int32_t s = r.sweeps->count; s > 0; s--)
         sweep_back(&r, s - 1);
     pass_divergence(&r, move, r.by_excess);
+    pass_inflow(&r);
     geometry_back(&r, false);
     scatter(&r, r.by_place, r.unit, gradients->position);
     push(&r, r.by_excess, by);

@@ -327,21 +327,6 @@ static ascc_status loss_at(rollout *r, size_t t, size_t unroll, double *loss, do
                         r->normal, r->first_frame + t, 1.0 / (double)unroll, loss, by_position);
 }
 
-/* Moving walls, and what their points stand for, as the step from a frame had them. */
-static ascc_status walls_back(rollout *r, size_t frame)
-{
-    ascc_rollout_worker *w = r->worker;
-    ascc_message message;
-    const ascc_search_tools tools = {&w->scratch, w->context->workers, &w->context->kernels,
-                                     &message};
-    place_walls(r, frame);
-    if (r->task->sequence->wall_frames == 1 || !(r->plan->relaxation.support > 0.0))
-        return ASCC_OK;
-    ascc_arena_reset(&w->scratch);
-    return ascc_wall_volumes_update(&w->step->walls, &tools, r->particles,
-                                    ascc_plan_wall_support(r->plan));
-}
-
 /* Adds to the gradient of velocities before a step what later steps read of them, and notes what this one read of
  * those before. */
 static void settle_past(rollout *r)
@@ -367,8 +352,6 @@ static ascc_status step_back(rollout *r, size_t t, const ascc_step_state *state,
                                                .velocity = r->by_velocity,
                                                .by_guess = r->by_guess,
                                                .by_before = r->place};
-    if (walls_back(r, r->first_frame + t) != ASCC_OK)
-        return ASCC_ERROR_MEMORY;
     if (r->task->relaxation_gradients &&
         ascc_relaxation_backward(state, &w->scratch, &relaxed) != ASCC_OK)
         return ASCC_ERROR_MEMORY;
