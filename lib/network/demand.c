@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "network.h"
+#include "sheets.h"
 
 /* ---- Prepared once ---- */
 
@@ -195,10 +196,24 @@ void ascc_network_destroy(ascc_network *network)
 
 /* ---- Backwards: demand ---- */
 
+/* The farthest that fluid in a list of fluid is apart, units. */
+static double fluid_reach(const ascc_network *network, const ascc_hierarchy *h)
+{
+    double reach = 0.0;
+    for (int32_t k = 0; k < network->key_count; k++)
+        if (network->key[k].query == ASCC_SET_FLUID && network->key[k].source == ASCC_SET_FLUID)
+            reach = fmax(reach, network->key[k].radius * h->scale.inverse);
+    return reach;
+}
+
 static ascc_status open_rows(ascc_network_run *run, const size_t *expected)
 {
     const ascc_network *network = run->network;
     ascc_hierarchy *h = run->hierarchy;
+    const ascc_status prepared =
+        ascc_sheets_prepare(h, run->tools, fluid_reach(network, h), network->max_neighbors);
+    if (prepared != ASCC_OK)
+        return prepared;
     for (int32_t k = 0; k < network->key_count; k++) {
         const ascc_list_key *key = &network->key[k];
         ascc_rows *rows = &run->rows[k];
@@ -211,6 +226,7 @@ static ascc_status open_rows(ascc_network_run *run, const size_t *expected)
         rows->limit = key->limit;
         rows->inverse_cube = key->cube > 0.0 ? (float)(h->scale.unit / key->cube) : 0.0f;
         rows->max_neighbors = network->max_neighbors;
+        ascc_sheets_veil(h, rows);
         ascc_status status =
             ascc_hierarchy_grid(h, run->tools, key->query, rows->radius, &rows->query_grid);
         if (status == ASCC_OK)

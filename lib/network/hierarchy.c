@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "points/resample.h"
+#include "sheets.h"
 
 _Static_assert(ASCC_MAX_LEVELS <= ASCC_EXTENT_SETS, "an extent takes level 0 and all coarser ones");
 
@@ -285,6 +286,8 @@ ascc_status ascc_hierarchy_build(ascc_hierarchy *h, const ascc_search_tools *too
     ascc_status status = build_level_zero(h, tools, plan, scene);
     if (status == ASCC_OK)
         status = find_drift(h, tools, plan, scene);
+    if (status == ASCC_OK)
+        status = ascc_sheets_find(h, tools, plan, scene);
     for (int level = 1; status == ASCC_OK && level < plan->level_count; level++)
         status = build_level(h, tools, plan, level);
     if (status != ASCC_OK)

@@ -18,9 +18,12 @@ typedef struct ascc_hierarchy {
     uint32_t *whole[2];  /* and back: [set row] of fluid, boundary */
     int32_t *place[2];   /* low words of fluid, boundary once more: [set row][4], the last 0 */
     const uint8_t *idle; /* rows of fluid whose impulses nobody wants; NULL = none */
-    float *drift; /* motions of walls in spacings a time step, [boundary set row][4]; NULL: all rest */
-    ascc_extent extent;  /* of all sets */
-    double base_radius;  /* units: level 0 is in the order of cells for it */
+    float *
+        drift; /* motions of walls in spacings a time step, [boundary set row][4]; NULL: all rest */
+    struct ascc_sheets
+        *sheets;        /* thin walls that hide what lies beyond (sheets.h); NULL: there is none */
+    ascc_extent extent; /* of all sets */
+    double base_radius; /* units: level 0 is in the order of cells for it */
     int grid_count;
     struct {
         int set;
@@ -38,6 +41,9 @@ typedef struct ascc_scene {
     const double *velocity, *mass, *normal; /* [fluid][dimension], [fluid], [boundary][dimension] */
     const double *wall_velocity;            /* [boundary][dimension]; NULL = all rest */
     double motion;                          /* what makes spacings a time step of it */
+    /* Where they are when the step begins, in units of so many metres; NULL: thin walls hide nothing. */
+    const double *fluid_before, *boundary_before;
+    double unit;
 } ascc_scene;
 
 /* Builds all sets the plan uses in the arena. errors: MEMORY, RANGE. */

@@ -175,6 +175,16 @@ static size_t drop_self(const ascc_rows *rows, const int32_t at[3], uint32_t *fo
     return kept;
 }
 
+/* Drops what the list's user does not want to see. */
+static size_t drop_hidden(const ascc_rows *rows, uint32_t query, uint32_t *found, size_t count)
+{
+    size_t kept = 0;
+    for (size_t k = 0; k < count; k++)
+        if (!rows->hides(rows->hides_data, query, found[k]))
+            found[kept++] = found[k];
+    return kept;
+}
+
 /* Appends the neighbours of one query within runs of at most SEARCH_CHUNK slots in all; false when there are
  * too many. */
 static bool search_piece(const searcher *s, const ascc_run *runs, size_t run_count,
@@ -188,6 +198,8 @@ static bool search_piece(const searcher *s, const ascc_run *runs, size_t run_cou
         fresh[k] = s->order[fresh[k]];
     if (rows->skip_self)
         n = drop_self(rows, at, fresh, n);
+    if (rows->hides)
+        n = drop_hidden(rows, query, fresh, n);
     *count += n;
     if (*count > (size_t)rows->max_neighbors) {
         if (!rows->limit)

@@ -22,6 +22,9 @@ typedef struct ascc_rows {
     bool skip_self;
     int32_t limit;         /* nearest neighbours kept, mutual if `same`; 0 = all */
     int32_t max_neighbors; /* before LIMIT */
+    /* Which neighbours lists leave out, the same from both sides if query and source are one set; NULL: none. */
+    bool (*hides)(const void *data, uint32_t query, uint32_t source);
+    const void *hides_data;
     uint32_t *count;       /* [query count] neighbours, or ASCC_ROW_ABSENT */
     size_t *start;         /* [query count] into neighbor */
     uint32_t *neighbor;    /* rows of the source set */

@@ -5,6 +5,8 @@
 #include <math.h>
 #include <string.h>
 
+#include "network/sheets.h"
+
 /* Of a disc, in spacings: discs on a square lattice one spacing apart leave no gap. */
 #define DISC 0.71
 /* A particle this much closer than the contact distance, in spacings, is still held there. */
@@ -46,8 +48,9 @@ void ascc_contact_try(const ascc_contact *job, const ascc_way *way, uint32_t wal
         begin += (way->from[c] - w0[c]) * n[c];
         end += (way->to[c] - w1[c]) * n[c];
     }
+    const bool sheet = state->hierarchy.sheets && state->hierarchy.sheets->is_sheet[wall];
     if (!(end < job->distance - job->nothing && end < begin - job->nothing &&
-          begin > job->distance - job->slack))
+          (sheet ? begin >= 0.0 : begin > job->distance - job->slack)))
         return;
     ascc_meeting m = {.wall = wall};
     m.share = begin > job->distance ? (begin - job->distance) / (begin - end) : 0.0;

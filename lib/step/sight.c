@@ -135,7 +135,10 @@ ascc_status ascc_stage_sight(ascc_step_state *state)
                         .mass = p->mass,
                         .normal = p->wall_normal,
                         .wall_velocity = state->advance.walls_move ? p->wall_velocity : NULL,
-                        .motion = motion_factor(state)};
+                        .motion = motion_factor(state),
+                        .fluid_before = p->position,
+                        .boundary_before = p->wall_position,
+                        .unit = state->length_unit};
     ascc_status status = find_areas(state);
     if (status != ASCC_OK)
         return status;

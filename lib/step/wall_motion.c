@@ -135,8 +135,9 @@ ascc_status ascc_find_wall_volumes(ascc_step_state *state, double support)
 {
     const ascc_particles *p = state->particles;
     const size_t count = p->boundary_count;
-    const ascc_status status = ascc_wall_volumes_update(
-        state->walls, &state->tools, state->advance.wall, count, p->dimension, support);
+    const ascc_status status =
+        ascc_wall_volumes_update(state->walls, &state->tools, state->advance.wall, p->wall_normal,
+                                 count, p->dimension, support);
     state->wall_volume = state->walls->volume;
     if (status != ASCC_OK || !state->advance.walls_move || !state->network->keeps_values)
         return status;
