@@ -85,7 +85,7 @@ export UBSAN_OPTIONS=halt_on_error=1:print_stacktrace=1
 suite release --buildtype=release
 suite sanitize --buildtype=debugoptimized -Db_sanitize=address,undefined -Db_lundef=false \
     -Db_ndebug=false -Dc_args=-fsanitize=float-cast-overflow
-for t in tests/check_tree.sh tests/check_tree_test.sh tests/install_test.sh tests/embed_test.sh tests/cli_test.sh tests/view_test.sh tests/train_test.sh tests/docs_test.sh tests/convert_test.sh tests/export_test.sh tests/python_test.sh tests/bench_test.sh tests/stability_test.sh tests/cross_test.sh tests/windows_test.sh tests/web_test.sh; do
+for t in tests/check_tree.sh tests/check_tree_test.sh tests/install_test.sh tests/embed_test.sh tests/cli_test.sh tests/view_test.sh tests/train_test.sh tests/docs_test.sh tests/convert_test.sh tests/export_test.sh tests/python_test.sh tests/bench_test.sh tests/stability_test.sh tests/cross_test.sh tests/windows_test.sh tests/web_test.sh tests/hosts_test.sh; do
     [ -f "$t" ] && script "$t" build-release
 done
 script tests/models_test.sh build-release

@@ -52,5 +52,6 @@ setup_cross() {
     setup_optional cmake cmake # tests/embed_test.sh
     setup_optional sdl2-config libsdl2-dev # ascc view
     setup_optional Xvfb xvfb               # tests/view_test.sh
+    pkg-config --exists box2d bullet || setup_optional box2d-and-bullet libbox2d-dev libbullet-dev # tests/hosts_test.sh
     return 0
 }
