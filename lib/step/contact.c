@@ -16,15 +16,16 @@
 
 /* ---- One way and one wall ---- */
 
-/* Where a wall is when so much of the step has passed. */
-static void wall_at(const ascc_contact *job, size_t row, double when, double at[3])
+/* Where a wall is when so much of the step has passed: `at`, or the set's own numbers while walls rest. */
+static const double *wall_at(const ascc_contact *job, size_t row, double when, double at[3])
 {
     const ascc_step_state *state = job->state;
     const size_t d = (size_t)state->particles->dimension;
     const double *begin = state->particles->wall_position + row * d;
     const double *end = state->advance.wall + row * d;
-    for (size_t c = 0; c < d; c++)
+    for (size_t c = 0; begin != end && c < d; c++)
         at[c] = begin[c] + when * (end[c] - begin[c]);
+    return begin != end ? at : begin;
 }
 
 /* The first that is met, in an order that is not the host's. */
@@ -42,8 +43,8 @@ void ascc_contact_try(const ascc_contact *job, const ascc_way *way, uint32_t wal
     const ascc_particles *p = state->particles;
     const size_t d = (size_t)p->dimension, row = ascc_hierarchy_wall_row(&state->hierarchy, wall);
     const double *n = p->wall_normal + row * d, *w1 = state->advance.wall + row * d;
-    double w0[3], begin = 0.0, end = 0.0, square = 0.0, along = 0.0;
-    wall_at(job, row, way->when, w0);
+    double place[3], begin = 0.0, end = 0.0, square = 0.0, along = 0.0;
+    const double *w0 = wall_at(job, row, way->when, place);
     for (size_t c = 0; c < d; c++) {
         begin += (way->from[c] - w0[c]) * n[c];
         end += (way->to[c] - w1[c]) * n[c];
@@ -98,9 +99,9 @@ bool ascc_contact_bend(const ascc_contact *job, size_t row, const ascc_meeting *
     const size_t d = (size_t)state->particles->dimension;
     const size_t wall = ascc_hierarchy_wall_row(&state->hierarchy, m->wall);
     const bool last = ++way->meetings == ASCC_MEETINGS;
-    double now[3];
+    double place[3];
     way->when += m->share * (1.0 - way->when);
-    wall_at(job, wall, way->when, now);
+    const double *now = wall_at(job, wall, way->when, place);
     for (size_t c = 0; c < d; c++) {
         way->from[c] += m->share * (way->to[c] - way->from[c]);
         way->to[c] = last ? way->from[c] + (state->advance.wall[wall * d + c] - now[c])
@@ -113,7 +114,7 @@ bool ascc_contact_bend(const ascc_contact *job, size_t row, const ascc_meeting *
 
 typedef struct near_job {
     ascc_contact *contact;
-    ascc_way *way;    /* [set rows] */
+    ascc_way *way;    /* [set rows] of those that are left */
     uint8_t *is_left; /* [set rows] 1 = the lists may lack walls of what is left of the way */
 } near_job;
 
@@ -124,12 +125,12 @@ static bool is_covered(const ascc_contact *job, size_t i, const ascc_way *way)
     const size_t d = (size_t)job->state->particles->dimension;
     double from = 0.0, to = 0.0;
     for (size_t c = 0; c < d; c++) {
-        const double seen =
-            (double)h->set[ASCC_SET_FLUID].position[c][i] * h->scale.unit / job->state->length_unit;
+        const double seen = (double)h->set[ASCC_SET_FLUID].position[c][i] * job->seen_unit;
         from += (way->from[c] - seen) * (way->from[c] - seen);
         to += (way->to[c] - seen) * (way->to[c] - seen);
     }
-    return sqrt(fmax(from, to)) + job->near <= job->reach;
+    const double most = job->reach - job->near;
+    return most >= 0.0 && from <= most * most && to <= most * most;
 }
 
 /* Follows a row's way to its end, or to where the lists no longer tell; false where that cannot be held. */
@@ -141,23 +142,23 @@ static bool follow(near_job *job, size_t i)
     const size_t d = (size_t)p->dimension;
     const size_t row = ascc_hierarchy_host_row(&state->hierarchy, ASCC_SET_FLUID, i);
     const uint32_t *neighbor = contact->rows->neighbor + contact->rows->start[i];
-    ascc_way *way = &job->way[i];
-    *way = (ascc_way){.meetings = 0};
+    ascc_way way = {.meetings = 0};
     for (size_t c = 0; c < d; c++) {
-        way->from[c] = p->position[row * d + c];
-        way->to[c] = state->advance.position[row * d + c];
+        way.from[c] = p->position[row * d + c];
+        way.to[c] = state->advance.position[row * d + c];
     }
-    while (way->meetings < ASCC_MEETINGS) {
-        if (!is_covered(contact, i, way)) {
+    while (way.meetings < ASCC_MEETINGS) {
+        if (!is_covered(contact, i, &way)) {
             job->is_left[i] = 1;
+            job->way[i] = way;
             return true;
         }
         ascc_meeting first = ascc_no_meeting();
         for (size_t k = 0; k < contact->rows->count[i]; k++)
-            ascc_contact_try(contact, way, neighbor[k], &first);
+            ascc_contact_try(contact, &way, neighbor[k], &first);
         if (first.share > 1.0)
             return true;
-        if (!ascc_contact_bend(contact, row, &first, way))
+        if (!ascc_contact_bend(contact, row, &first, &way))
             return false;
     }
     return true;
@@ -188,6 +189,7 @@ static ascc_contact open_contact(ascc_step_state *state, double distance)
     ascc_contact contact = {.state = state,
                             .rows = rows,
                             .distance = distance / state->length_unit,
+                            .seen_unit = state->hierarchy.scale.unit / state->length_unit,
                             .disc = DISC * spacing,
                             .slack = SLACK * spacing,
                             .nothing = NOTHING * spacing};

@@ -22,6 +22,7 @@ typedef struct ascc_contact {
     ascc_step_state *state;
     const ascc_rows *rows; /* walls around the fluid */
     double distance, disc, slack, nothing;
+    double seen_unit; /* of the places where the network sees fluid */
     double reach; /* of the lists, from where the network sees a particle; 0: they may lack walls */
     double near;  /* a wall that is met is no farther from the place where it ends */
     atomic_size_t bad; /* 1 + first set row that fails */
