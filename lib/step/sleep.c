@@ -207,10 +207,13 @@ static void put_to_sleep(judgement *j)
 
 /* ---- The stage ---- */
 
-/* A negative number for a gravity: another one wakes all. */
-static int32_t code_of(const double gravity[3])
+/* A negative number for the host's gravity: another one wakes all. */
+static int32_t code_of(const ascc_step_state *state)
 {
+    double gravity[3];
     uint64_t hash = 1;
+    memcpy(gravity, state->motion->gravity, sizeof gravity);
+    ascc_turn_reals(&state->turn, true, gravity, 1, state->particles->dimension);
     for (int c = 0; c < 3; c++) {
         uint64_t bits;
         const double g = gravity[c] + 0.0; /* -0 is 0 */
@@ -246,7 +249,7 @@ static bool open_judgement(judgement *j, ascc_step_state *state, double fall)
         .fall = fall,
         .limit = fall * state->motion->sleep_speed,
         .calm = steps < 1e6 ? (int32_t)steps : 1000000,
-        .code = code_of(state->motion->gravity),
+        .code = code_of(state),
         .reach = (int64_t)ceil(
             (fmax(ascc_plan_support_radius(plan), plan->relaxation.reach) + plan->spacing) / edge)};
     j->of = ascc_arena_take(arena, n, sizeof *j->of);

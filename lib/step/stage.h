@@ -9,6 +9,7 @@
 
 #include "network/pair_sum.h"
 #include "points/particles.h"
+#include "turn.h"
 #include "wall_volumes.h"
 
 /* What one step does from outside, in the host's units. */
@@ -29,7 +30,7 @@ typedef struct ascc_advance {
     int64_t *momentum; /* at the end */
     int64_t *external; /* impulse of gravity and acceleration, quanta */
     /* Where walls end, [boundary count][dimension]: the particles' own array while none moves. */
-    const double *wall;
+    double *wall;
     const double *wall_velocity; /* as it was when the step began; NULL: all rest */
     double wall_way;             /* the farthest that one goes */
     bool walls_move;
@@ -67,6 +68,7 @@ typedef struct ascc_step_state {
     const ascc_network *network;
     const ascc_particles *particles;
     const ascc_motion *motion;
+    ascc_turn turn;                /* of all that stages see, from the host's axes */
     double length_unit, time_unit; /* m and s of the model in the host's unit and second */
     size_t *expected;              /* of the network's neighbour lists */
     ascc_status (*engine)(struct ascc_step_state *state); /* engine.h */

@@ -213,6 +213,57 @@ static ascc_status remember(ascc_step *step, ascc_particles *p)
                      "no memory for %d velocities of %zu particles", history, p->fluid_count);
 }
 
+static ascc_status run_stages(ascc_step_state *state)
+{
+    ascc_status status = ASCC_OK;
+    for (size_t i = 0; i < sizeof stages / sizeof *stages && status == ASCC_OK; i++) {
+        if (stages[i].moves && all_sleeps(state))
+            continue;
+        status = stages[i].run(state);
+        if (stages[i].name)
+            ascc_stage_lap(state, stages[i].name);
+    }
+    return status;
+}
+
+/* All that the state holds of a step until it is committed. */
+static void turn_back(ascc_step_state *state)
+{
+    const ascc_turn *turn = &state->turn;
+    const ascc_particles *p = state->particles;
+    const ascc_advance *a = &state->advance;
+    ascc_turn_reals(turn, true, a->position, p->fluid_count, p->dimension);
+    ascc_turn_integers(turn, true, a->momentum, p->fluid_count, p->dimension);
+    ascc_turn_integers(turn, true, a->external, p->fluid_count, p->dimension);
+    ascc_turn_integers(turn, true, state->impulses.wall, p->boundary_count, p->dimension);
+    ascc_turn_integers(turn, true, state->sleep.support, 1, p->dimension);
+    if (a->walls_move)
+        ascc_turn_reals(turn, true, a->wall, p->boundary_count, p->dimension);
+}
+
+/* All stages in turned axes; the particles are in the host's again when this returns. */
+static ascc_status run_turned(const ascc_step *step, ascc_particles *p, ascc_step_state *state)
+{
+    const ascc_turn *turn = &state->turn;
+    const int32_t d = p->dimension;
+    const ascc_motion *given = state->motion;
+    double *acceleration = given->acceleration ? step->acceleration : NULL;
+    ascc_motion motion = *given;
+    ascc_turn_reals(turn, false, motion.gravity, 1, d);
+    ascc_turn_particles(turn, false, p);
+    if (acceleration)
+        ascc_turn_reals(turn, false, acceleration, p->fluid_count, d);
+    state->motion = &motion;
+    const ascc_status status = run_stages(state);
+    state->motion = given;
+    if (acceleration)
+        ascc_turn_reals(turn, true, acceleration, p->fluid_count, d);
+    ascc_turn_particles(turn, true, p);
+    if (status == ASCC_OK)
+        turn_back(state);
+    return status;
+}
+
 ascc_status ascc_step_once(ascc_step *step, ascc_particles *p, const ascc_motion *motion,
                            bool first, ascc_arena *arena, ascc_step_state *state)
 {
@@ -221,6 +272,7 @@ ascc_status ascc_step_once(ascc_step *step, ascc_particles *p, const ascc_motion
         .network = &step->network,
         .particles = p,
         .motion = motion,
+        .turn = step->turn,
         .length_unit = step->model_length,
         .time_unit = step->model_time,
         .expected = step->expected,
@@ -231,13 +283,8 @@ ascc_status ascc_step_once(ascc_step *step, ascc_particles *p, const ascc_motion
         .since = ascc_clock()};
     const double begin = state->since;
     ascc_status status = remember(step, p);
-    for (size_t i = 0; i < sizeof stages / sizeof *stages && status == ASCC_OK; i++) {
-        if (stages[i].moves && all_sleeps(state))
-            continue;
-        status = stages[i].run(state);
-        if (stages[i].name)
-            ascc_stage_lap(state, stages[i].name);
-    }
+    if (status == ASCC_OK)
+        status = ascc_turns(&state->turn) ? run_turned(step, p, state) : run_stages(state);
     if (status == ASCC_OK)
         status = ascc_stage_commit(state, p, first);
     ascc_stage_lap(state, "commit");
@@ -401,6 +448,7 @@ ascc_status ascc_step_run(ascc_step *step, ascc_particles *particles, const ascc
     if (status == ASCC_OK)
         status = read_forces(step, particles, forces, &motion);
     if (status == ASCC_OK) {
+        step->turn = ascc_turn_find(&step->model->plan, motion.gravity);
         ascc_step_statistics *s = &step->statistics;
         ascc_totals(step->context->workers, s->momentum_before, particles->momentum,
                     particles->fluid_count, (size_t)particles->dimension);

@@ -4,6 +4,7 @@
 
 #include "engine.h"
 #include "model/model.h"
+#include "turn.h"
 
 struct ascc_step {
     uint32_t magic;
@@ -23,6 +24,7 @@ struct ascc_step {
     size_t acceleration_capacity;
     unsigned char *kept; /* the state before the first of several substeps */
     size_t kept_capacity;
+    ascc_turn turn; /* of the run under way; none for a trainer's steps */
     bool continues; /* the next run adds to impulses of walls that another step's began */
     ascc_step_statistics statistics;
     ascc_message message;
