@@ -291,6 +291,91 @@ static void walk_changes(ascc_particles *particles, const scene *s)
     BAD(ascc_particles_set(particles, ASCC_FLUID, ASCC_MASS, 0, 9, &velocity));
 }
 
+/* A body and a tap come, move and go: the set is as before in all that others look at. */
+static void walk_bodies(ascc_particles *particles)
+{
+    const ascc_shape ball = {
+        .size = sizeof ball, .kind = ASCC_SHAPE_SPHERE, .radius = 2.3 * SPACING};
+    const ascc_pose pose = {
+        .size = sizeof pose, .position = {9.0, 9.0, 9.0}, .spin = {0.1, 0.2, 1e-310}};
+    const ascc_drain drain = {.size = sizeof drain,
+                              .kind = ASCC_DRAIN_SPHERE,
+                              .position = {3.0, 3.0, 3.0},
+                              .radius = 4.0 * SPACING};
+    ascc_tap tap = {.size = sizeof tap,
+                    .position = {3.0, 3.0, 3.0},
+                    .radius = 1.2 * SPACING,
+                    .velocity = {0.0, -1.0, 0.1}};
+    ascc_body_info info = {.size = sizeof info};
+    int32_t body = -1;
+    int64_t impulse[1][3];
+    double torque[1][3];
+    size_t count;
+    GOOD(ascc_body_add(particles, &ball, &pose, &body));
+    BAD(ascc_body_add(particles, &ball, &(ascc_pose){0}, &(int32_t){0}));
+    GOOD(ascc_body_move(particles, body, &pose));
+    BAD(ascc_body_move(particles, body + 1, &pose));
+    GOOD(ascc_body_get(particles, body, &info));
+    BAD(ascc_body_get(particles, body + 1, &info));
+    DO(count = ascc_bodies_list(particles, 1, &body));
+    assert_int_equal(count, 1);
+    GOOD(ascc_bodies_impulse(particles, 1, &body, impulse, torque));
+    GOOD(ascc_body_remove(particles, body));
+    BAD(ascc_body_remove(particles, body));
+    GOOD(ascc_tap_run(particles, &tap, 0.1, 0, NULL, &count));
+    assert_true(count > 0);
+    tap.radius = -1.0;
+    BAD(ascc_tap_run(particles, &tap, 0.1, 0, NULL, &count));
+    GOOD(ascc_drain_run(particles, &drain, 0, NULL, &count));
+    assert_true(count > 0);
+    BAD(ascc_drain_run(particles, &(ascc_drain){0}, 0, NULL, &count));
+}
+
+static void walk_sleep(ascc_particles *particles)
+{
+    uint8_t asleep[MAX_FLUID];
+    GOOD(ascc_particles_get_asleep(particles, 0, 55, asleep));
+    BAD(ascc_particles_get_asleep(particles, 50, 55, asleep));
+    GOOD(ascc_particles_wake(particles));
+}
+
+static void walk_ladder(ascc_context *context, const ascc_model *model, ascc_particles *particles)
+{
+    const ascc_model *const models[] = {model, model};
+    const int32_t rungs[] = {1, 0}, none[] = {2};
+    ascc_ladder_statistics statistics = {.size = sizeof statistics};
+    ascc_ladder *ladder;
+    const ascc_step *step;
+    const char *message;
+    int32_t chosen[3];
+    uint64_t steps;
+    size_t size;
+    GOOD(ascc_ladder_create(context, 2, models, NULL, &ladder));
+    BAD(ascc_ladder_create(context, 0, models, NULL, &(ascc_ladder *){NULL}));
+    GOOD(ascc_ladder_set_budget(ladder, 1.0));
+    BAD(ascc_ladder_set_budget(ladder, -1.0));
+    GOOD(ascc_ladder_measure(ladder, particles, NULL));
+    GOOD(ascc_ladder_run(ladder, particles, NULL, 1));
+    GOOD(ascc_ladder_replay(ladder, particles, NULL, rungs, 2));
+    BAD(ascc_ladder_replay(ladder, particles, NULL, none, 1));
+    GOOD(ascc_ladder_get_statistics(ladder, &statistics));
+    DO(step = ascc_ladder_step(ladder, 1));
+    assert_non_null(step);
+    DO(steps = ascc_ladder_step_count(ladder));
+    assert_int_equal(steps, 3);
+    GOOD(ascc_ladder_get_choices(ladder, 0, 3, chosen));
+    BAD(ascc_ladder_get_choices(ladder, 1, 3, chosen));
+    DO(size = ascc_ladder_snapshot_size(ladder));
+    void *const memory = malloc(size);
+    GOOD(ascc_ladder_snapshot(ladder, memory, size));
+    GOOD(ascc_ladder_restore(ladder, memory, size));
+    BAD(ascc_ladder_restore(ladder, memory, size - 1));
+    free(memory);
+    DO(message = ascc_ladder_message(ladder));
+    assert_true(message[0] != '\0');
+    DO(ascc_ladder_destroy(&ladder));
+}
+
 static void walk_readings(ascc_particles *particles)
 {
     double values[3 * MAX_FLUID], torque[3], quantum;
@@ -411,6 +496,9 @@ static void every_call_leaves_the_environment_as_it_was(void **state)
         walk_models(context, s, &model);
         walk_changes(particles, s);
         walk_steps(context, model, particles);
+        walk_ladder(context, model, particles);
+        walk_bodies(particles);
+        walk_sleep(particles);
         walk_readings(particles);
         walk_snapshots(particles);
         DO(ascc_particles_destroy(&particles));
