@@ -446,7 +446,7 @@ static inline void pair_numbers(const ascc_pairs *pairs, size_t i, const uint32_
                                 const float *drift, float number[LANES][LANES])
 {
     const float *from[LANES];
-    float scale[LANES];
+    float scale[LANES] = {0.0f};
     vector v[4], relative[3], moved[4] = {fill(0.0f), fill(0.0f), fill(0.0f), fill(0.0f)};
     for (size_t l = 0; l < LANES; l++) {
         const size_t j = neighbor[i + (l < n ? l : 0)];

@@ -9,7 +9,8 @@
 #include "commit.h"
 
 _Static_assert(sizeof(void *) != 8 || sizeof(ascc_ladder_options) == 48, "released layout");
-_Static_assert(sizeof(ascc_ladder_statistics) % 8 == 0, "no padding at the end");
+_Static_assert(sizeof(void *) != 8 || sizeof(ascc_ladder_statistics) % 8 == 0,
+               "no padding at the end");
 
 #define SAME 1e-6 /* relative: of two models' spacings, time steps, gravities */
 /* Steps of each rung when it is measured: the first makes scratch. */
