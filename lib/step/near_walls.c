@@ -15,9 +15,6 @@
  * network gives, all walls are near. */
 #define MARGIN 4.0
 
-/* What contact looks at beside a way, spacings: a disc as far off as a wall holds fluid. */
-#define BESIDE 1.25
-
 /* The blocks of places; they follow one another mostly in one block. */
 static void add_places(ascc_blocks *blocks, const double *place, size_t count, int32_t dimension,
                        double edge)
@@ -28,46 +25,6 @@ static void add_places(ascc_blocks *blocks, const double *place, size_t count, i
         if (memcmp(at, last, sizeof at) != 0)
             (void)ascc_blocks_add(blocks, at);
         memcpy(last, at, sizeof last);
-    }
-}
-
-/* Where what flies beyond the blocks around it may meet walls, however they bend its way; false: nothing does. */
-static bool find_far_box(const ascc_step_state *state, double edge, double low[3], double high[3])
-{
-    const ascc_particles *p = state->particles;
-    const size_t d = (size_t)p->dimension;
-    const double beside = BESIDE * p->spacing + state->advance.wall_way;
-    bool any = false;
-    for (size_t c = 0; c < 3; c++) {
-        low[c] = INFINITY;
-        high[c] = -INFINITY;
-    }
-    for (size_t i = 0; i < p->fluid_count; i++) {
-        double square = 0.0;
-        for (size_t c = 0; c < d; c++)
-            square += state->advance.velocity[i * d + c] * state->advance.velocity[i * d + c];
-        const double way = state->motion->time_step * sqrt(square) + beside;
-        if (way <= edge)
-            continue;
-        any = true;
-        for (size_t c = 0; c < d; c++) {
-            low[c] = fmin(low[c], p->position[i * d + c] - way);
-            high[c] = fmax(high[c], p->position[i * d + c] + way);
-        }
-    }
-    return any;
-}
-
-/* Walls in this box are near. */
-static void mark_box(uint8_t *near, const ascc_particles *p, const double *place,
-                     const double low[3], const double high[3])
-{
-    const size_t d = (size_t)p->dimension;
-    for (size_t i = 0; i < p->boundary_count; i++) {
-        bool inside = true;
-        for (size_t c = 0; c < d; c++)
-            inside &= place[i * d + c] >= low[c] && place[i * d + c] <= high[c];
-        near[i] |= inside;
     }
 }
 
@@ -94,32 +51,33 @@ static bool lend_blocks(ascc_blocks *blocks, ascc_arena *arena, size_t most)
     return at && slot;
 }
 
-/* Walls at these places that are near; those that are already stay so. */
-static void mark(uint8_t *near, const ascc_blocks *wide, const ascc_particles *p,
-                 const double *place, double edge)
+/* Which walls are near. */
+static void mark(uint8_t *near, const ascc_blocks *wide, const ascc_particles *p, double edge)
 {
     int64_t at[3], last[3] = {INT64_MAX, 0, 0};
     uint8_t found = 0;
     for (size_t i = 0; i < p->boundary_count; i++) {
-        ascc_block_of(place + i * (size_t)p->dimension, p->dimension, edge, at);
+        ascc_block_of(p->wall_position + i * (size_t)p->dimension, p->dimension, edge, at);
         if (memcmp(at, last, sizeof at) != 0)
             found = ascc_blocks_find(wide, at) != ASCC_NO_BLOCK;
         memcpy(last, at, sizeof last);
-        near[i] |= found;
+        near[i] = found;
     }
 }
 
-/* Whether a particle goes so far on some axis. */
+/* Whether a particle goes so far. However walls bend a way, it stays within its length of the end that is seen. */
 static bool goes_far(const ascc_step_state *state, double far)
 {
     const ascc_particles *p = state->particles;
-    const size_t numbers = p->fluid_count * (size_t)p->dimension;
-    const double square = far * far;
+    const size_t d = (size_t)p->dimension;
+    const double dt = state->motion->time_step;
     bool goes = false;
-    for (size_t k = 0; k < numbers; k++) {
-        const double way =
-            state->motion->time_step * state->advance.velocity[k]; /* wherever it is seen */
-        goes |= !(way * way <= square);
+    for (size_t i = 0; i < p->fluid_count; i++) {
+        const double *const v = state->advance.velocity + i * d;
+        double square = 0.0;
+        for (size_t c = 0; c < d; c++)
+            square += v[c] * v[c];
+        goes |= !(dt * dt * square <= far * far);
     }
     return goes;
 }
@@ -143,13 +101,7 @@ bool ascc_near_walls(ascc_step_state *state, uint8_t **near)
     }
     if (room) {
         widen(&wide, &blocks, p->dimension);
-        memset(*near, 0, p->boundary_count);
-        mark(*near, &wide, p, p->wall_position, edge);
-        if (state->advance.walls_move)
-            mark(*near, &wide, p, state->advance.wall, edge);
-        double low[3], high[3];
-        if (find_far_box(state, edge, low, high))
-            mark_box(*near, p, state->advance.wall, low, high);
+        mark(*near, &wide, p, edge);
     }
     ascc_arena_return(arena, mark_of);
     return room;
