@@ -8,6 +8,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "blocks.h"
 #include "fields.h"
 #include "particles.h"
 #include "shapes.h"
@@ -34,12 +35,6 @@ static size_t bucket_of(const int64_t cell[3])
     return (size_t)(hash >> 48);
 }
 
-static void cell_of(const taken *points, const double position[3], int64_t cell[3])
-{
-    for (size_t c = 0; c < 3; c++)
-        cell[c] = c < points->surface->dimension ? (int64_t)floor(position[c] / points->cell) : 0;
-}
-
 static bool is_near(const taken *points, size_t other, const double position[3],
                     const double normal[3])
 {
@@ -58,7 +53,7 @@ static bool is_crowded(const taken *points, const double position[3], const doub
 {
     const int64_t deep = points->surface->dimension == 3 ? 1 : 0;
     int64_t cell[3];
-    cell_of(points, position, cell);
+    ascc_block_of(position, (int32_t)points->surface->dimension, points->cell, cell);
     for (int64_t z = -deep; z <= deep; z++)
         for (int64_t y = -1; y <= 1; y++)
             for (int64_t x = -1; x <= 1; x++) {
@@ -80,7 +75,7 @@ static bool take(taken *points, const double position[3], const double normal[3]
         !ascc_surface_add(points->surface, position, normal))
         return false;
     int64_t cell[3];
-    cell_of(points, position, cell);
+    ascc_block_of(position, (int32_t)points->surface->dimension, points->cell, cell);
     const size_t bucket = bucket_of(cell);
     points->next[i] = points->bucket[bucket];
     points->bucket[bucket] = i;

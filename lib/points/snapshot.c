@@ -1,4 +1,5 @@
 /* Snapshot, restore and hash of a particle set. SPDX-License-Identifier: MIT */
+#include "base/words.h"
 #include "bodies.h"
 #include "rotation.h"
 
@@ -32,45 +33,6 @@ static size_t row_words(ascc_kind kind, int32_t dimension, int32_t past, size_t 
         if (ascc_particle_fields[i].kind == kind)
             words += (size_t)ascc_field_numbers(&ascc_particle_fields[i], dimension, past);
     return words;
-}
-
-static uint64_t bits_of(double value)
-{
-    uint64_t bits;
-    memcpy(&bits, &value, sizeof bits);
-    return bits;
-}
-
-static double double_of(uint64_t bits)
-{
-    double value;
-    memcpy(&value, &bits, sizeof value);
-    return value;
-}
-
-static void put_word(unsigned char *into, uint64_t word)
-{
-    for (int i = 0; i < 8; i++)
-        into[i] = (unsigned char)(word >> 8 * i);
-}
-
-static uint64_t get_word(const unsigned char *from)
-{
-    uint64_t word = 0;
-    for (int i = 0; i < 8; i++)
-        word |= (uint64_t)from[i] << 8 * i;
-    return word;
-}
-
-/* Each step is a bijection of both the sum and the word, so no change of one word goes unseen. */
-static uint64_t checksum(const unsigned char *bytes, size_t words)
-{
-    uint64_t sum = SNAPSHOT_MAGIC;
-    for (size_t i = 0; i < words; i++) {
-        sum = (sum ^ get_word(bytes + 8 * i)) * UINT64_C(0x9e3779b97f4a7c15);
-        sum ^= sum >> 32;
-    }
-    return sum;
 }
 
 static size_t snapshot_words(const ascc_particles *particles)
@@ -116,7 +78,7 @@ static bool number_from_word(const ascc_particle_field *field, unsigned char *nu
 
 static unsigned char *put(unsigned char *into, uint64_t word)
 {
-    put_word(into, word);
+    ascc_put_word(into, word);
     return into + 8;
 }
 
@@ -132,7 +94,7 @@ static unsigned char *put_body(unsigned char *into, const struct ascc_body *body
                (const unsigned char *)body + offsetof(struct ascc_body, position) +
                    k * sizeof number,
                sizeof number);
-        into = put(into, bits_of(number));
+        into = put(into, ascc_bits_of(number));
     }
     return into;
 }
@@ -154,9 +116,9 @@ ascc_status ascc_particles_snapshot(const ascc_particles *particles, void *memor
     at = put(at, particles->fluid_count);
     at = put(at, particles->boundary_count);
     at = put(at, particles->next_id);
-    at = put(at, bits_of(particles->spacing));
-    at = put(at, bits_of(particles->default_mass));
-    at = put(at, bits_of(particles->quantum));
+    at = put(at, ascc_bits_of(particles->spacing));
+    at = put(at, ascc_bits_of(particles->default_mass));
+    at = put(at, ascc_bits_of(particles->quantum));
     for (size_t i = 0; i < ASCC_FIELD_COUNT; i++) {
         const ascc_particle_field *const field = &ascc_particle_fields[i];
         const unsigned char *const numbers = ascc_field_rows(particles, field);
@@ -170,7 +132,7 @@ ascc_status ascc_particles_snapshot(const ascc_particles *particles, void *memor
         at = put_body(at, &particles->bodies[b]);
     at = put(at, (uint64_t)particles->next_body);
     at = put(at, particles->body_count);
-    put(at, checksum(memory, (size_t)(at - (unsigned char *)memory) / 8));
+    put(at, ascc_sum_words(SNAPSHOT_MAGIC, memory, (size_t)(at - (unsigned char *)memory) / 8));
     return ASCC_OK;
 }
 
@@ -194,20 +156,20 @@ typedef struct snapshot {
 static bool open_snapshot(const unsigned char *bytes, size_t size, snapshot *from, const char **why)
 {
     *why = "not a snapshot";
-    if (size < 8 * SNAPSHOT_FRAME || size % 8 != 0 || get_word(bytes) != SNAPSHOT_MAGIC)
+    if (size < 8 * SNAPSHOT_FRAME || size % 8 != 0 || ascc_get_word(bytes) != SNAPSHOT_MAGIC)
         return false;
     *why = "of a version not known here";
-    const uint64_t version = get_word(bytes + 8), past = version >> PAST_SHIFT;
+    const uint64_t version = ascc_get_word(bytes + 8), past = version >> PAST_SHIFT;
     const size_t fields = ascc_snapshot_fields(version & UINT32_MAX);
     if (fields == 0 || past > (fields == ASCC_FIELD_COUNT ? ASCC_MAX_HISTORY : 0))
         return false;
     *why = "damaged: its checksum is wrong";
-    if (get_word(bytes + size - 8) != checksum(bytes, size / 8 - 1))
+    if (ascc_get_word(bytes + size - 8) != ascc_sum_words(SNAPSHOT_MAGIC, bytes, size / 8 - 1))
         return false;
 
     *why = "of no possible dimension or size";
-    const uint64_t dimension = get_word(bytes + 16);
-    const uint64_t fluid = get_word(bytes + 24), boundary = get_word(bytes + 32);
+    const uint64_t dimension = ascc_get_word(bytes + 16);
+    const uint64_t fluid = ascc_get_word(bytes + 24), boundary = ascc_get_word(bytes + 32);
     if (dimension != 2 && dimension != 3)
         return false;
     const unsigned char *const end = bytes + size - 8;
@@ -217,8 +179,8 @@ static bool open_snapshot(const unsigned char *bytes, size_t size, snapshot *fro
         if (words < BODIES_FRAME)
             return false;
         words -= BODIES_FRAME;
-        bodies = get_word(end - 8);
-        next_body = get_word(end - 16);
+        bodies = ascc_get_word(end - 8);
+        next_body = ascc_get_word(end - 16);
         if (bodies > words / BODY_WORDS || next_body > (uint64_t)INT32_MAX + 1)
             return false;
         words -= (size_t)bodies * BODY_WORDS;
@@ -234,10 +196,10 @@ static bool open_snapshot(const unsigned char *bytes, size_t size, snapshot *fro
                        .past = (int32_t)past,
                        .fields = fields,
                        .rows = {(size_t)fluid, (size_t)boundary},
-                       .next_id = get_word(bytes + 40),
-                       .spacing = double_of(get_word(bytes + 48)),
-                       .mass = double_of(get_word(bytes + 56)),
-                       .quantum = double_of(get_word(bytes + 64)),
+                       .next_id = ascc_get_word(bytes + 40),
+                       .spacing = ascc_double_of(ascc_get_word(bytes + 48)),
+                       .mass = ascc_double_of(ascc_get_word(bytes + 56)),
+                       .quantum = ascc_double_of(ascc_get_word(bytes + 64)),
                        .body_count = (size_t)bodies,
                        .next_body = (int64_t)next_body,
                        .bodies = end - 8 * (BODIES_FRAME + (size_t)bodies * BODY_WORDS)};
@@ -268,7 +230,7 @@ static ascc_status check_field(const snapshot *from, size_t index, ascc_message 
     for (row.row = 0; row.row < from->rows[field->kind]; row.row++) {
         bool fits = true;
         for (size_t c = 0; c < (size_t)row.numbers; c++, at += 8)
-            fits &= number_from_word(field, (unsigned char *)&values, c, get_word(at));
+            fits &= number_from_word(field, (unsigned char *)&values, c, ascc_get_word(at));
         if (!fits)
             return ascc_fail(message, ASCC_ERROR_FORMAT, "%s: row %zu does not fit 32 bits",
                              field->name, row.row);
@@ -287,8 +249,8 @@ static bool are_ids(const snapshot *from)
     size_t i = 0, k = 0;
     uint64_t last = 0;
     while (i < fluid_count || k < wall_count) {
-        const uint64_t fluid = i < fluid_count ? get_word(fluid_ids + 8 * i) : UINT64_MAX;
-        const uint64_t wall = k < wall_count ? get_word(wall_ids + 8 * k) : UINT64_MAX;
+        const uint64_t fluid = i < fluid_count ? ascc_get_word(fluid_ids + 8 * i) : UINT64_MAX;
+        const uint64_t wall = k < wall_count ? ascc_get_word(wall_ids + 8 * k) : UINT64_MAX;
         const bool is_fluid = k == wall_count || (i < fluid_count && fluid < wall);
         const uint64_t id = is_fluid ? fluid : wall;
         if (id <= last || id >= from->next_id)
@@ -305,12 +267,12 @@ static bool are_ids(const snapshot *from)
 static struct ascc_body get_body(const snapshot *from, size_t index)
 {
     const unsigned char *at = from->bodies + 8 * BODY_WORDS * index;
-    struct ascc_body body = {.number = (int32_t)get_word(at),
-                             .moved = (int32_t)(get_word(at + 8) & 1),
-                             .first_id = get_word(at + 16),
-                             .end_id = get_word(at + 24)};
+    struct ascc_body body = {.number = (int32_t)ascc_get_word(at),
+                             .moved = (int32_t)(ascc_get_word(at + 8) & 1),
+                             .first_id = ascc_get_word(at + 16),
+                             .end_id = ascc_get_word(at + 24)};
     for (size_t k = 0; k < ASCC_BODY_NUMBERS; k++) {
-        const double number = double_of(get_word(at + 32 + 8 * k));
+        const double number = ascc_double_of(ascc_get_word(at + 32 + 8 * k));
         memcpy((unsigned char *)&body + offsetof(struct ascc_body, position) + k * sizeof number,
                &number, sizeof number);
     }
@@ -325,7 +287,7 @@ static ascc_status check_bodies(const snapshot *from, ascc_message *message)
     for (size_t b = 0; b < from->body_count; b++) {
         struct ascc_body body = get_body(from, b);
         const unsigned char *const at = from->bodies + 8 * BODY_WORDS * b;
-        if (get_word(at) > INT32_MAX || get_word(at + 8) > 1 || body.number <= number ||
+        if (ascc_get_word(at) > INT32_MAX || ascc_get_word(at + 8) > 1 || body.number <= number ||
             body.number >= from->next_body || body.first_id < id || body.end_id < body.first_id ||
             body.end_id > from->next_id)
             return ascc_fail(message, ASCC_ERROR_FORMAT, "body %zu of %zu has impossible numbers",
@@ -358,7 +320,7 @@ static bool is_body_number(const snapshot *from, uint64_t number)
     size_t low = 0, high = from->body_count;
     while (low < high) {
         const size_t middle = low + (high - low) / 2;
-        const uint64_t found = get_word(from->bodies + 8 * BODY_WORDS * middle);
+        const uint64_t found = ascc_get_word(from->bodies + 8 * BODY_WORDS * middle);
         if (found == number)
             return true;
         if (found < number)
@@ -377,13 +339,13 @@ static ascc_status check_points_of_bodies(const snapshot *from, ascc_message *me
     if (from->fields <= ASCC_FIELD_wall_own_position)
         return ASCC_OK;
     for (size_t row = 0; row < from->rows[ASCC_BOUNDARY]; row++) {
-        const uint64_t number = get_word(from->words[ASCC_FIELD_wall_body] + 8 * row);
-        const uint64_t id = get_word(from->words[ASCC_FIELD_wall_id] + 8 * row);
+        const uint64_t number = ascc_get_word(from->words[ASCC_FIELD_wall_body] + 8 * row);
+        const uint64_t id = ascc_get_word(from->words[ASCC_FIELD_wall_id] + 8 * row);
         const int64_t body = body_of_id(from, id, &next);
         const unsigned char *const own = from->words[ASCC_FIELD_wall_own_normal] + 8 * row * d;
         bool has_normal = false;
         for (size_t c = 0; c < d; c++)
-            has_normal |= double_of(get_word(own + 8 * c)) != 0;
+            has_normal |= ascc_double_of(ascc_get_word(own + 8 * c)) != 0;
         if ((int64_t)number >= from->next_body ||
             (body >= 0 ? number != (uint64_t)body || !has_normal : is_body_number(from, number)))
             return ascc_fail(message, ASCC_ERROR_FORMAT,
@@ -440,7 +402,7 @@ static void become(ascc_particles *particles, const snapshot *from)
         const size_t count = from->rows[field->kind] *
                              (size_t)ascc_field_numbers(field, from->dimension, from->past);
         for (size_t k = 0; k < count; k++)
-            (void)number_from_word(field, numbers, k, get_word(from->words[i] + 8 * k));
+            (void)number_from_word(field, numbers, k, ascc_get_word(from->words[i] + 8 * k));
     }
     become_bodies(particles, from);
 }
@@ -497,7 +459,7 @@ static uint64_t mix_row(uint64_t hash, const ascc_particle_field *field, const u
     for (size_t k = row * numbers; k < (row + 1) * numbers; k++) {
         uint64_t word = number_word(field, rows, k);
         if (field->element == ASCC_REAL)
-            word = bits_of(double_of(word) + 0.0); /* -0 + 0 is 0 */
+            word = ascc_bits_of(ascc_double_of(word) + 0.0); /* -0 + 0 is 0 */
         zero &= word == 0;
         mixed = mix(mixed, word);
     }
@@ -531,13 +493,13 @@ static uint64_t sum_bodies(const ascc_particles *particles)
         uint64_t one = mix(0, ASCC_KIND_COUNT);
         one = mix(one, (uint64_t)body->number);
         for (int c = 0; c < 3; c++) {
-            one = mix(one, bits_of(body->position[c] + 0.0));
-            one = mix(one, bits_of(body->velocity[c] + 0.0));
-            one = mix(one, bits_of(body->spin[c] + 0.0));
+            one = mix(one, ascc_bits_of(body->position[c] + 0.0));
+            one = mix(one, ascc_bits_of(body->velocity[c] + 0.0));
+            one = mix(one, ascc_bits_of(body->spin[c] + 0.0));
         }
         for (int c = 0; c < 4; c++)
-            one = mix(one, bits_of(body->rotation[c] + 0.0));
-        sum += mix(one, bits_of(body->angle + 0.0));
+            one = mix(one, ascc_bits_of(body->rotation[c] + 0.0));
+        sum += mix(one, ascc_bits_of(body->angle + 0.0));
     }
     return sum;
 }
@@ -550,7 +512,7 @@ uint64_t ascc_particles_hash(const ascc_particles *particles)
     uint64_t hash = mix(0, ascc_particles_width(particles));
     hash = mix(hash, particles->fluid_count);
     hash = mix(hash, particles->boundary_count);
-    hash = mix(hash, bits_of(particles->quantum));
+    hash = mix(hash, ascc_bits_of(particles->quantum));
     return hash + sum_rows(particles, ASCC_FLUID) + sum_rows(particles, ASCC_BOUNDARY) +
            sum_bodies(particles);
 }

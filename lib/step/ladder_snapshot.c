@@ -1,7 +1,7 @@
 /* A ladder's choices and what it knows of costs, as bytes and back. SPDX-License-Identifier: MIT */
 #include <math.h>
-#include <string.h>
 
+#include "base/words.h"
 #include "ladder.h"
 
 /*
@@ -26,42 +26,18 @@ static size_t words_of(size_t rungs, size_t changes)
 
 static unsigned char *put(unsigned char *at, uint64_t word)
 {
-    for (int i = 0; i < 8; i++)
-        at[i] = (unsigned char)(word >> 8 * i);
+    ascc_put_word(at, word);
     return at + 8;
-}
-
-static unsigned char *put_real(unsigned char *at, double value)
-{
-    uint64_t bits;
-    memcpy(&bits, &value, sizeof bits);
-    return put(at, bits);
 }
 
 static uint64_t word(const unsigned char *bytes, size_t index)
 {
-    uint64_t value = 0;
-    for (size_t i = 0; i < 8; i++)
-        value |= (uint64_t)bytes[8 * index + i] << 8 * i;
-    return value;
+    return ascc_get_word(bytes + 8 * index);
 }
 
 static double real(const unsigned char *bytes, size_t index)
 {
-    const uint64_t bits = word(bytes, index);
-    double value;
-    memcpy(&value, &bits, sizeof value);
-    return value;
-}
-
-static uint64_t checksum(const unsigned char *bytes, size_t words)
-{
-    uint64_t sum = MAGIC;
-    for (size_t i = 0; i < words; i++) {
-        sum = (sum ^ word(bytes, i)) * UINT64_C(0x9e3779b97f4a7c15);
-        sum ^= sum >> 32;
-    }
-    return sum;
+    return ascc_double_of(word(bytes, index));
 }
 
 size_t ascc_ladder_snapshot_size(const ascc_ladder *ladder)
@@ -86,16 +62,16 @@ ascc_status ascc_ladder_snapshot(const ascc_ladder *ladder, void *memory, size_t
     at = put(at, s->late);
     at = put(at, ladder->change_count);
     for (int i = 0; i < ASCC_RUNG_RECENT; i++)
-        at = put_real(at, choice->recent[i]);
+        at = put(at, ascc_bits_of(choice->recent[i]));
     for (int32_t r = 0; r < ladder->count; r++)
-        at = put_real(at, choice->cost[r]);
+        at = put(at, ascc_bits_of(choice->cost[r]));
     for (int32_t r = 0; r < ladder->count; r++)
         at = put(at, s->steps_on[r]);
     for (size_t k = 0; k < ladder->change_count; k++) {
         at = put(at, ladder->change[k].step);
         at = put(at, (uint64_t)ladder->change[k].rung);
     }
-    put(at, checksum(memory, (size_t)(at - (unsigned char *)memory) / 8));
+    put(at, ascc_sum_words(MAGIC, memory, (size_t)(at - (unsigned char *)memory) / 8));
     return ASCC_OK;
 }
 
@@ -129,7 +105,7 @@ static ascc_status check(ascc_ladder *ladder, const unsigned char *bytes, size_t
         return ascc_ladder_fail(ladder, ASCC_ERROR_FORMAT, "memory: not a ladder's snapshot");
     if (word(bytes, 1) != VERSION)
         return ascc_ladder_fail(ladder, ASCC_ERROR_FORMAT, "memory: of a version not known here");
-    if (word(bytes, words - 1) != checksum(bytes, words - 1))
+    if (word(bytes, words - 1) != ascc_sum_words(MAGIC, bytes, words - 1))
         return ascc_ladder_fail(ladder, ASCC_ERROR_FORMAT,
                                 "memory: damaged: its checksum is wrong");
     const uint64_t rungs = word(bytes, 2), changes = word(bytes, 7);
