@@ -113,8 +113,10 @@ void ascc_members_numbers(ascc_members *members, json_t *object, const char *key
         ascc_members_fail(members, "'%s' must be a list of %zu numbers", key, count);
     for (size_t i = 0; i < count && ascc_members_good(members); i++) {
         const json_t *value = json_array_get(list, i);
-        numbers[i] = json_number_value(value);
-        if (!json_is_number(value) || !(numbers[i] >= low && numbers[i] <= high))
+        const double number = json_number_value(value);
+        if (json_is_number(value) && number >= low && number <= high)
+            numbers[i] = number;
+        else
             ascc_members_fail(members, "'%s' must be a list of numbers within [%g, %g]", key, low,
                               high);
     }

@@ -33,7 +33,7 @@ double ascc_members_number(ascc_members *members, json_t *object, const char *ke
                            double high);
 int ascc_members_integer(ascc_members *members, json_t *object, const char *key, int low, int high);
 bool ascc_members_flag(ascc_members *members, json_t *object, const char *key);
-/* Exactly `count` numbers. */
+/* Exactly `count` numbers; what does not fit leaves its place as it was, so that all stay within the bounds. */
 void ascc_members_numbers(ascc_members *members, json_t *object, const char *key, size_t count,
                           double low, double high, double *numbers);
 

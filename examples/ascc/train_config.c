@@ -213,8 +213,11 @@ static void read_coarse(ascc_members *r, json_t *o, ascc_architecture *a)
     if (a->levels || has(r, o, "coarse_channels"))
         ascc_members_numbers(r, o, "coarse_channels", (size_t)a->levels, 1.0,
                              ASCC_ARCHITECTURE_CHANNELS, channels);
-    for (int32_t i = 0; i < a->levels; i++)
+    for (int32_t i = 0; i < a->levels; i++) {
         a->coarse_channels[i] = (int32_t)channels[i];
+        if ((double)a->coarse_channels[i] != channels[i])
+            ascc_members_fail(r, "'coarse_channels' must be integers");
+    }
 }
 
 static void read_scene(ascc_members *r, json_t *o, ascc_architecture *a)
