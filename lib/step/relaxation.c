@@ -49,9 +49,10 @@ typedef struct relaxation {
     const double *place;    /* [count][3] before the step, if corrections lie along those lines */
     float *scratch;         /* [slots][4][room] */
     size_t room;
-    float omega;     /* of the sweep under way */
-    bool slows;      /* sweeps are on velocities, not densities */
-    float repulsion; /* below this distance, in supports */
+    ascc_relaxation_trace *trace; /* of a step whose values are kept, else NULL */
+    float omega;                  /* of the sweep under way */
+    bool slows;                   /* sweeps are on velocities, not densities */
+    float repulsion;              /* below this distance, in supports */
     atomic_size_t bad;
     atomic_uint_least64_t compression, largest;
 } relaxation;
@@ -67,10 +68,18 @@ static ascc_gradients gradients(const relaxation *r)
 
 /* ---- Memory ---- */
 
-static bool lend_vector(ascc_arena *arena, float *vector[3], size_t count)
+/* Lent, but taken if a way back reads it. */
+static void *room_for(const relaxation *r, size_t count, size_t element)
+{
+    ascc_arena *arena = r->state->tools.arena;
+    return r->trace ? ascc_arena_take(arena, count, element)
+                    : ascc_arena_lend(arena, count, element);
+}
+
+static bool vector_room(const relaxation *r, float *vector[3], size_t count)
 {
     for (int c = 0; c < 3; c++) {
-        vector[c] = ascc_arena_lend(arena, count, sizeof *vector[c]);
+        vector[c] = room_for(r, count, sizeof *vector[c]);
         if (!vector[c])
             return false;
     }
@@ -107,26 +116,26 @@ static bool lend_memory(relaxation *r)
     float **const numbers[] = {&r->excess, &r->response, &r->pressure, &r->change};
     bool room = true;
     for (size_t i = 0; i < sizeof numbers / sizeof *numbers; i++)
-        room &= (*numbers[i] = ascc_arena_lend(arena, n, sizeof(float))) != NULL;
-    r->low = ascc_arena_lend(arena, n, 4 * sizeof *r->low);
-    r->start = ascc_arena_lend(arena, n, sizeof *r->start);
-    r->end = ascc_arena_lend(arena, n, sizeof *r->end);
+        room &= (*numbers[i] = room_for(r, n, sizeof(float))) != NULL;
+    r->low = room_for(r, n, 4 * sizeof *r->low);
+    r->start = room_for(r, n, sizeof *r->start);
+    r->end = room_for(r, n, sizeof *r->end);
     r->move = ascc_arena_lend(arena, n, 4 * sizeof *r->move);
-    r->near = ascc_arena_lend(arena, n, 1);
+    r->near = room_for(r, n, 1);
     if (!room || !r->start || !r->end || !r->low || !r->move || !r->near ||
-        !lend_vector(arena, r->own, n))
+        !vector_room(r, r->own, n))
         return false;
     const size_t pairs = place_rows(r);
     r->room = whole_vectors(ascc_max_size(r->rows->longest, r->wall_rows->longest));
-    r->neighbor = ascc_arena_lend(arena, pairs, sizeof *r->neighbor);
+    r->neighbor = room_for(r, pairs, sizeof *r->neighbor);
     r->scratch = ascc_arena_lend(arena, slots * r->room, 4 * sizeof *r->scratch);
     memcpy(r->push, r->own, sizeof r->push);
     if (!r->sum.uniform) {
-        r->weight = ascc_arena_lend(arena, pairs, sizeof *r->weight);
-        if (!r->weight || !lend_vector(arena, r->push, n))
+        r->weight = room_for(r, pairs, sizeof *r->weight);
+        if (!r->weight || !vector_room(r, r->push, n))
             return false;
     }
-    return r->neighbor && r->scratch && lend_vector(arena, r->g, pairs);
+    return r->neighbor && r->scratch && vector_room(r, r->g, pairs);
 }
 
 /* ---- Geometry ---- */
@@ -328,7 +337,7 @@ static bool lend_volumes(relaxation *r)
 {
     const ascc_hierarchy *h = &r->state->hierarchy;
     const size_t count = h->set[ASCC_SET_BOUNDARY].count;
-    float *volume = ascc_arena_lend(r->state->tools.arena, count, sizeof *volume);
+    float *volume = room_for(r, count, sizeof *volume);
     for (size_t i = 0; volume && i < count; i++)
         volume[i] = r->state->wall_volume[ascc_hierarchy_wall_row(h, i)];
     r->wall_volume = volume;
@@ -344,7 +353,7 @@ static bool lend_wall_places(relaxation *r)
     if (!r->state->advance.walls_move || r->state->motion->advection != ASCC_ADVECT_NONE)
         return true;
     for (size_t c = 0; c < 3; c++) {
-        r->wall_low[c] = ascc_arena_lend(r->state->tools.arena, count, sizeof(int32_t));
+        r->wall_low[c] = room_for(r, count, sizeof(int32_t));
         if (!r->wall_low[c])
             return false;
         for (size_t i = 0; i < count; i++) {
@@ -368,7 +377,7 @@ static bool lend_wall_moves(relaxation *r)
     if (!r->slows || !r->state->advance.walls_move)
         return true;
     r->inflow = ascc_arena_lend(r->state->tools.arena, r->count, sizeof *r->inflow);
-    if (!r->inflow || !lend_vector(r->state->tools.arena, r->wall_move, count))
+    if (!r->inflow || !vector_room(r, r->wall_move, count))
         return false;
     for (size_t i = 0; i < count; i++)
         for (size_t c = 0; c < 3; c++)
@@ -378,13 +387,61 @@ static bool lend_wall_moves(relaxation *r)
     return true;
 }
 
+/* ---- A way back ---- */
+
+/* What is known before the sweeps begin; false without memory. */
+static bool begin_trace(const relaxation *r)
+{
+    ascc_relaxation_trace *t = r->trace;
+    const ascc_sweeps *sweeps = r->slows ? &r->constants->divergence : &r->constants->pressure;
+    const size_t n = r->count, count = (size_t)sweeps->count;
+    int32_t *const *seen = r->state->hierarchy.set[ASCC_SET_BOUNDARY].low;
+    float *move = room_for(r, n, 4 * sizeof *move);
+    t->pressure = room_for(r, (count + 1) * n, sizeof *t->pressure);
+    t->change = room_for(r, count * n, sizeof *t->change);
+    t->push = room_for(r, count * n, 4 * sizeof *t->push);
+    if (!move || !t->pressure || !t->change || !t->push)
+        return false;
+    memcpy(move, r->move, n * 4 * sizeof *move);
+    for (int c = 0; c < 3; c++) {
+        t->wall_low[c] = r->wall_low[0] ? r->wall_low[c] : seen[c];
+        t->wall_move[c] = r->wall_move[c];
+        t->own[c] = r->own[c];
+    }
+    t->pairs = gradients(r);
+    t->wall_volume = r->wall_volume;
+    t->excess = r->excess;
+    t->response = r->response;
+    t->near = r->near;
+    t->move = move;
+    t->low = r->low;
+    return true;
+}
+
+/* Sweep k has been made of the pressures before it; k = -1: none yet. */
+static void trace_sweep(const relaxation *r, int32_t k)
+{
+    ascc_relaxation_trace *t = r->trace;
+    const size_t n = r->count, at = (size_t)(k + 1) * n;
+    if (k < 0 && !r->guess) {
+        memset(t->pressure, 0, n * sizeof *t->pressure);
+        return;
+    }
+    memcpy(t->pressure + at, r->pressure, n * sizeof *t->pressure);
+    if (k < 0)
+        return;
+    memcpy(t->change + at - n, r->change, n * sizeof *t->change);
+    memcpy(t->push + 4 * (at - n), r->move, 4 * n * sizeof *t->push);
+}
+
 /* Everything that sweeps read. slows: of velocities. */
 static ascc_status open_relaxation(relaxation *r, ascc_step_state *state, bool slows)
 {
+    ascc_relaxed *relaxed = &state->relaxed;
     const ascc_network_run *run = &state->run;
     const ascc_search_tools *tools = &state->tools;
     const ascc_relaxation *constants = &state->network->plan->relaxation;
-    const ascc_relaxation_round *round = &state->relaxed.round[state->relaxed.rounds - 1];
+    ascc_relaxation_round *round = &relaxed->round[relaxed->rounds - 1];
     *r =
         (relaxation){.state = state,
                      .constants = constants,
@@ -394,6 +451,8 @@ static ascc_status open_relaxation(relaxation *r, ascc_step_state *state, bool s
                      .inverse_support = (float)(state->hierarchy.scale.unit / constants->support),
                      .repulsion = slows ? 0.0f : (float)(constants->repulsion / constants->support),
                      .slows = slows};
+    if (state->network->keeps_values)
+        r->trace = slows ? &relaxed->divergence : &round->trace;
     if (r->count > INT32_MAX)
         return ascc_fail(tools->message, ASCC_ERROR_RANGE, "more than 2^31 particles to relax");
     ascc_status status = ascc_find_wall_volumes(state, constants->support / state->length_unit);
@@ -413,7 +472,9 @@ static ascc_status open_relaxation(relaxation *r, ascc_step_state *state, bool s
                          state->particles->id[row], row);
     }
     ascc_workers_run(tools->workers, r->count, ROWS, look_around, r);
-    return ASCC_OK;
+    return r->trace && !begin_trace(r)
+               ? ascc_fail(tools->message, ASCC_ERROR_MEMORY, "no memory for the relaxation")
+               : ASCC_OK;
 }
 
 /* ---- Sweeps ---- */
@@ -468,6 +529,10 @@ static void sweep(relaxation *r, const ascc_sweeps *sweeps)
     ascc_workers *workers = r->state->tools.workers;
     if (r->guess)
         ascc_workers_run(workers, r->count, 16 * ROWS, guess_rows, r);
+    if (r->trace) {
+        r->trace->guessed = r->guess != NULL;
+        trace_sweep(r, -1);
+    }
     for (int32_t k = 0; k < sweeps->count; k++) {
         r->omega = (float)sweeps->omega[k];
         if (k > 0 || r->guess) {
@@ -476,6 +541,8 @@ static void sweep(relaxation *r, const ascc_sweeps *sweeps)
         } else {
             ascc_workers_run(workers, r->count, 16 * ROWS, begin_rows, r);
         }
+        if (r->trace)
+            trace_sweep(r, k);
     }
 }
 
@@ -672,33 +739,6 @@ static int64_t *lend_given(ascc_step_state *state)
                            sizeof(int64_t));
 }
 
-/* What a way back begins with; all true where there is none. */
-static bool keep_positions(ascc_step_state *state)
-{
-    const ascc_particles *p = state->particles;
-    const size_t numbers = p->fluid_count * (size_t)p->dimension;
-    if (!state->network->keeps_values)
-        return true;
-    double *to = ascc_arena_take(state->tools.arena, numbers, sizeof *to);
-    if (to)
-        memcpy(to, state->advance.position, numbers * sizeof *to);
-    state->relaxed.round[state->relaxed.rounds - 1].position = to;
-    return to != NULL;
-}
-
-static bool keep_velocities(ascc_step_state *state)
-{
-    const ascc_particles *p = state->particles;
-    const size_t d = (size_t)p->dimension, numbers = p->fluid_count * d;
-    if (!state->network->keeps_values)
-        return true;
-    double *to = ascc_arena_take(state->tools.arena, numbers, sizeof *to);
-    for (size_t k = 0; to && k < numbers; k++)
-        to[k] = (double)state->advance.momentum[k] * p->quantum / p->mass[k / d];
-    state->relaxed.velocity = to;
-    return to != NULL;
-}
-
 static ascc_status no_memory(const ascc_step_state *state)
 {
     return ascc_fail(state->tools.message, ASCC_ERROR_MEMORY, "no memory for the relaxation");
@@ -766,8 +806,6 @@ static ascc_status run_round(ascc_step_state *state, ascc_compression *found)
     ascc_status status = begin_round(state);
     if (status != ASCC_OK)
         return status;
-    if (!keep_positions(state))
-        return no_memory(state);
     const ascc_arena_mark mark = ascc_arena_mark_of(state->tools.arena);
     relaxation r;
     status = relax(state, &r, lend_given(state), found);
@@ -815,8 +853,6 @@ ascc_status ascc_stage_divergence(ascc_step_state *state)
 {
     if (!state->network->plan->relaxation.divergence.count || !state->particles->fluid_count)
         return ASCC_OK;
-    if (!keep_velocities(state))
-        return no_memory(state);
     const ascc_arena_mark mark = ascc_arena_mark_of(state->tools.arena);
     relaxation r;
     const ascc_status status = slow_down(state, &r, lend_given(state));

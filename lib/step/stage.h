@@ -49,17 +49,33 @@ typedef struct ascc_sleep {
 /* At a free surface, where density lacks more than this, a divergence means nothing. */
 #define ASCC_SURFACE 0.35f
 
+/* What the sweeps of a relaxation leave for a way back, of rows of ASCC_SET_FLUID; lengths in supports. */
+typedef struct ascc_relaxation_trace {
+    const int32_t *low; /* [row][4] places as the hierarchy has them; NULL: nothing was kept */
+    const int32_t *wall_low[3];              /* of walls */
+    const float *wall_volume, *wall_move[3]; /* wall_move: NULL = none is on velocities */
+    ascc_gradients pairs;
+    float *own[3]; /* sums of gradients, walls included */
+    const float *excess, *response;
+    const uint8_t *near; /* rows with neighbours within the repulsion */
+    const float *move;   /* [row][4] of velocities, before their divergence was taken from them */
+    float *pressure;     /* [sweep + 1][row] */
+    float *change;       /* [sweep][row] */
+    float *push;         /* [sweep][row][4] by the pressures before it */
+    bool guessed;        /* else the first sweep begins with 0 and changes nothing */
+} ascc_relaxation_trace;
+
 /* What a round of the relaxation began with. */
 typedef struct ascc_relaxation_round {
-    double *position; /* kept for a way back: [fluid count][dimension], host's units, or NULL */
     const ascc_rows *rows[2]; /* neighbours among fluid and walls */
+    ascc_relaxation_trace trace;
 } ascc_relaxation_round;
 
 /* What the relaxation did; the divergence has the neighbours of its last round. */
 typedef struct ascc_relaxed {
     int32_t rounds;
     ascc_relaxation_round round[ASCC_MAX_ROUNDS];
-    double *velocity; /* likewise kept, before their divergence was taken from them */
+    ascc_relaxation_trace divergence;
 } ascc_relaxed;
 
 /* All intermediate results of one step, in its arena: valid until that is reset. */

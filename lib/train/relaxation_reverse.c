@@ -1,499 +1,495 @@
-/* The relaxation once more in doubles, and its adjoint (step/relaxation.c has the formulas; docs/training.md).
+/* The adjoint of the relaxation (step/relaxation.c has the formulas; docs/training.md), from what its sweeps left.
  * SPDX-License-Identifier: MIT
  *
  * With P the map from pressures to pushes, d = -P p, the sweeps are p' = max(0, p + omega (c - P^T P p) r),
- * r the responses: so a sweep's way back is made of the same two maps. What they and the densities are made
- * of, the gradients g of pairs, collects its own gradient pair by pair, which at the end goes to positions.
+ * r the responses: so a sweep's way back is made of the same two maps, on the same pairs, by the same kernels.
+ *
+ * The pairs' gradients g collect their own from every sweep: of a divergence of moves m, c_i (m_i - m_j), and of
+ * pushes by p, -(p_i + p_j) b_i, with c and b the gradients of divergence and push. Both sides of a pair
+ * together give (c_i + c_j) (m_i - m_j) - (p_i + p_j) (b_i - b_j). So each sweep leaves its four with the rows, and
+ * all of them go to positions in one pass over unordered pairs.
  */
 #include "relaxation_reverse.h"
 
 #include <math.h>
 #include <string.h>
 
-/* A neighbour of a row, in supports. */
-typedef struct neighbor {
-    size_t at;  /* fluid row, or wall row */
-    bool fluid; /* else a wall */
-    double u[3], distance;
-    double g[3];             /* volume * gradient */
-    double slope, curvature; /* volume * derivatives of the spline by distance */
-    double limit;            /* of its correction */
-    double by_g[3];          /* gradient */
-} neighbor;
+/* What a sweep leaves with a row: (c_i + c_j) times the difference of moves, and likewise of pushes. */
+typedef struct side {
+    float move[3], by_change;
+    float by_push[3], pressure; /* by_push: its negative */
+} side;
 
-/* What sweeps read of a neighbour in the fluid: 32 bytes, some twenty times a step. */
-typedef struct fluid_pair {
-    double g[3];
-    size_t at;
-} fluid_pair;
+/* What a row has but for those. */
+typedef struct head {
+    float response[3], twice; /* 2 by_square times own; 2 by_square */
+    float density;            /* gradient of it */
+} head;
+
+/* Pairs of a row and what they are made of. */
+typedef struct batch {
+    size_t count;
+    uint32_t neighbor[ASCC_PAIR_BATCH];
+    float x[ASCC_PAIR_BATCH], y[ASCC_PAIR_BATCH], z[ASCC_PAIR_BATCH], distance[ASCC_PAIR_BATCH];
+    float slope[ASCC_PAIR_BATCH], curvature[ASCC_PAIR_BATCH]; /* of the spline, times the volume */
+} batch;
 
 typedef struct reverse {
     const ascc_step_state *state;
     const ascc_relaxation *constants;
     const ascc_sweeps *sweeps;
-    const ascc_rows *const *rows; /* neighbours among fluid and walls */
+    const ascc_rows *wall_rows;
+    const ascc_relaxation_trace *trace;
     ascc_arena *arena;
     size_t count, d;
     double unit; /* supports of a unit of the host */
-    /* In the order of the fluid's rows: */
-    double *place;  /* [row][3] */
-    double *before; /* [row][3] before the step, if corrections lie along those lines */
-    size_t *start;  /* [row + 1] */
-    neighbor *pair;
-    size_t *fluid_start; /* [row + 1] */
-    fluid_pair *fluid;   /* of `pair`, in its order */
-    double *own;         /* [row][3] sum of g */
-    double *excess;      /* [row] what sweeps take away */
-    double *response;    /* [row] */
-    double *pressure;    /* [sweep + 1][row] */
-    double *push;        /* [sweep][row][3] by the pressure before it */
-    double *change;      /* [sweep][row] */
-    double repulsion;
-    const double *moving; /* velocities of the host's walls, or NULL: all rest */
-    /* Gradients: */
-    double *by_push;     /* [row][3] */
-    double *by_pressure; /* [row] */
-    double *by_excess, *by_response;
-    double *by_place;  /* [row][3] */
+    float limit, amount, repulsion, share, inverse_support;
+    const double *before; /* [row][3] before the step, if corrections lie along those lines */
+    side *side;           /* [row][sides] */
+    size_t sides, used;
+    head *head; /* [row] */
+    /* Gradients, [row], [row][3] or rows of 4: */
+    float *by_pressure, *by_change, *by_excess, *by_response, *by_push, *divergence;
+    float *by;         /* of the corrections */
+    float *by_place;   /* [row][3] */
     double *by_before; /* [row][3] likewise of `before` */
-    double *scratch;   /* [row][3] */
 } reverse;
 
-static double dot(const double a[3], const double b[3])
+static float dot(const float a[3], const float b[3])
 {
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
-static double *zeros(const reverse *r, size_t each)
+static float *zeros(const reverse *r, size_t each)
 {
-    double *taken = ascc_arena_take(r->arena, r->count * each + 1, sizeof *taken);
+    float *taken = ascc_arena_take(r->arena, r->count * each + 1, sizeof *taken);
     if (taken)
         memset(taken, 0, r->count * each * sizeof *taken);
     return taken;
 }
 
-/* ---- Forwards ---- */
-
-/* to[row][3] = factor * host[host's row][dimension] */
-static void gather(const reverse *r, const double *host, double factor, double *to)
+static size_t host_row(const reverse *r, size_t i)
 {
-    for (size_t i = 0; i < r->count; i++) {
-        const size_t row = ascc_hierarchy_host_row(&r->state->hierarchy, ASCC_SET_FLUID, i);
-        for (size_t c = 0; c < 3; c++)
-            to[i * 3 + c] = c < r->d ? host[row * r->d + c] * factor : 0.0;
+    return ascc_hierarchy_host_row(&r->state->hierarchy, ASCC_SET_FLUID, i);
+}
+
+/* ---- Pairs ---- */
+
+/* Slopes and curvatures of a batch of unit volumes. */
+static void find_spline(batch *b)
+{
+    for (size_t k = 0; k < b->count; k++) {
+        const float q = b->distance[k], far = 1.0f - q;
+        const float near = q < 0.5f ? 0.5f - q : 0.0f;
+        b->slope[k] = -6.0f * (far * far - 4.0f * near * near);
+        b->curvature[k] = 12.0f * (far - 4.0f * near);
     }
 }
 
-/* Fills a pair of these places; false if it is too far apart to act. */
-static bool look_at(const reverse *r, const double from[3], const double to[3], double volume,
-                    neighbor *n)
+/* The pairs of row i whose neighbours come after it, from *at on; false if there are none left. */
+static bool next_pairs(const reverse *r, size_t i, size_t *at, batch *b)
 {
-    double square = 0.0;
-    for (int c = 0; c < 3; c++) {
-        n->u[c] = to[c] - from[c];
-        square += n->u[c] * n->u[c];
-        n->by_g[c] = 0.0;
+    const ascc_relaxation_trace *t = r->trace;
+    const size_t end = t->pairs.end[i];
+    const ascc_pairs pairs = {.x = b->x, .y = b->y, .z = b->z, .distance = b->distance};
+    b->count = 0;
+    while (*at < end && b->count < ASCC_PAIR_BATCH) {
+        const uint32_t j = t->pairs.neighbor[(*at)++];
+        b->neighbor[b->count] = j;
+        b->count += j > i;
     }
-    if (square >= 1.0)
+    if (!b->count)
         return false;
-    const double q = n->distance = sqrt(square);
-    const double far = 1.0 - q, near = q < 0.5 ? 0.5 - q : 0.0;
-    n->slope = -6.0 * volume * (far * far - 4.0 * near * near);
-    n->curvature = 12.0 * volume * (far - 4.0 * near);
-    n->limit = r->constants->limit / r->constants->support * volume / r->constants->amount;
-    for (int c = 0; c < 3; c++) {
-        n->u[c] = q > 0.0 ? n->u[c] / q : 0.0;
-        n->g[c] = -n->slope * n->u[c];
+    r->state->tools.kernels->directions(t->low, b->neighbor, b->count, t->low + i * 4,
+                                        r->inverse_support, &pairs);
+    find_spline(b);
+    for (size_t k = 0; k < b->count; k++) {
+        b->slope[k] *= r->amount;
+        b->curvature[k] *= r->amount;
     }
     return true;
 }
 
-static double density_of(double q, double volume)
+/* The same of walls within the support: those that are not have no slope. */
+static bool next_walls(const reverse *r, size_t i, size_t *at, batch *b)
 {
-    const double far = 1.0 - q, near = q < 0.5 ? 0.5 - q : 0.0;
-    return volume * (2.0 * far * far * far - 8.0 * near * near * near);
-}
-
-/* The pairs of row i behind those before it. Returns the density that they make. */
-static double look_around(reverse *r, size_t i)
-{
-    const ascc_step_state *state = r->state;
-    const ascc_hierarchy *h = &state->hierarchy;
-    const double amount = r->constants->amount;
-    double density = amount; /* its own */
-    size_t at = r->start[i];
-    for (int list = 0; list < 2; list++) {
-        const ascc_rows *rows = r->rows[list];
-        for (uint32_t k = 0; k < rows->count[i]; k++) {
-            const size_t j = rows->neighbor[rows->start[i] + k];
-            double place[3] = {0.0, 0.0, 0.0}, volume = amount;
-            neighbor *n = &r->pair[at];
-            if (!list && j == i)
-                continue;
-            if (list) {
-                const size_t row = ascc_hierarchy_wall_row(h, j);
-                volume = (double)state->wall_volume[row];
-                for (size_t c = 0; c < r->d; c++)
-                    place[c] = state->advance.wall[row * r->d + c] * r->unit;
-            }
-            if (!look_at(r, r->place + i * 3, list ? place : r->place + j * 3, volume, n))
-                continue;
-            n->at = j;
-            n->fluid = list == 0;
-            density += density_of(n->distance, volume);
-            at++;
-        }
+    const ascc_relaxation_trace *t = r->trace;
+    const ascc_rows *rows = r->wall_rows;
+    const ascc_coordinates points = {t->wall_low[0], t->wall_low[1], t->wall_low[2]};
+    const ascc_pairs pairs = {.x = b->x, .y = b->y, .z = b->z, .distance = b->distance};
+    const int32_t *place = t->low + i * 4;
+    if (*at >= rows->count[i])
+        return false;
+    b->count = ascc_min_size(ASCC_PAIR_BATCH, rows->count[i] - *at);
+    memcpy(b->neighbor, rows->neighbor + rows->start[i] + *at, b->count * sizeof *b->neighbor);
+    *at += b->count;
+    r->state->tools.kernels->geometry(&points, b->neighbor, b->count, place[0], place[1], place[2],
+                                      r->inverse_support, ASCC_MAPPING_DIRECTION, &pairs);
+    find_spline(b);
+    for (size_t k = 0; k < b->count; k++) {
+        const bool acts = b->distance[k] > 0.0f && b->distance[k] < 1.0f;
+        const float volume = acts ? t->wall_volume[b->neighbor[k]] : 0.0f;
+        b->slope[k] *= volume;
+        b->curvature[k] *= volume;
     }
-    r->start[i + 1] = at;
-    return density;
+    return true;
 }
 
-static bool take_pairs(reverse *r)
+/* to = along u (u . a) + across (a - u (u . a)) */
+static void bend(const float u[3], float along, float across, const float a[3], float to[3])
 {
-    size_t most = 1;
-    for (int list = 0; list < 2; list++) {
-        const ascc_rows *rows = r->rows[list];
-        for (size_t i = 0; i < r->count; i++)
-            most += rows->count[i];
-    }
-    r->pair = ascc_arena_take(r->arena, most, sizeof *r->pair);
-    r->start = ascc_arena_take(r->arena, r->count + 1, sizeof *r->start);
-    r->fluid = ascc_arena_take(r->arena, most, sizeof *r->fluid);
-    r->fluid_start = ascc_arena_take(r->arena, r->count + 1, sizeof *r->fluid_start);
-    return r->pair && r->start && r->fluid && r->fluid_start;
-}
-
-/* Pairs, densities and responses at r->place. */
-static void find_geometry(reverse *r)
-{
-    const double least = r->constants->epsilon * r->constants->lattice_response;
-    size_t at = 0;
-    r->start[0] = r->fluid_start[0] = 0;
-    for (size_t i = 0; i < r->count; i++) {
-        double square = 0.0, own[3] = {0.0, 0.0, 0.0};
-        r->excess[i] = look_around(r, i) - 1.0;
-        for (size_t k = r->start[i]; k < r->start[i + 1]; k++) {
-            const neighbor *n = &r->pair[k];
-            square += n->fluid ? dot(n->g, n->g) : 0.0;
-            if (n->fluid)
-                r->fluid[at++] = (fluid_pair){{n->g[0], n->g[1], n->g[2]}, n->at};
-            for (int c = 0; c < 3; c++)
-                own[c] += n->g[c];
-        }
-        r->fluid_start[i + 1] = at;
-        memcpy(r->own + i * 3, own, sizeof own);
-        r->response[i] = 1.0 / (square + dot(own, own) + least);
-    }
-}
-
-/* to[row] = -P pressure; of gradients: the adjoint of `divergence`, less its sign. */
-static void push(const reverse *r, const double *pressure, double *to)
-{
-    for (size_t i = 0; i < r->count; i++) {
-        double sum[3];
-        for (size_t c = 0; c < 3; c++)
-            sum[c] = pressure[i] * r->own[i * 3 + c];
-        for (size_t k = r->fluid_start[i]; k < r->fluid_start[i + 1]; k++)
-            for (int c = 0; c < 3; c++)
-                sum[c] += pressure[r->fluid[k].at] * r->fluid[k].g[c];
-        for (size_t c = 0; c < 3; c++)
-            to[i * 3 + c] = -sum[c];
-    }
-}
-
-/* to[row] = P^T move */
-static void divergence(const reverse *r, const double *move, double *to)
-{
-    for (size_t i = 0; i < r->count; i++) {
-        double sum = dot(r->own + i * 3, move + i * 3);
-        for (size_t k = r->fluid_start[i]; k < r->fluid_start[i + 1]; k++)
-            sum -= dot(r->fluid[k].g, move + r->fluid[k].at * 3);
-        to[i] = sum;
-    }
-}
-
-/* Pressures begin with a value of the network, in its units. */
-static void guess(reverse *r)
-{
-    const int32_t value = r->constants->guess;
-    const double unit = ascc_step_share(r->state) / r->constants->lattice_response;
-    for (size_t i = 0; value && i < r->count; i++)
-        r->pressure[i] = unit * (double)r->state->run.value[value].rectified[i * ascc_padded(1)];
-}
-
-static void guess_back(const reverse *r, double *by_guess)
-{
-    const double unit = ascc_step_share(r->state) / r->constants->lattice_response;
-    for (size_t i = 0; r->constants->guess && i < r->count; i++)
-        by_guess[ascc_hierarchy_host_row(&r->state->hierarchy, ASCC_SET_FLUID, i)] =
-            unit * r->by_pressure[i];
-}
-
-static void sweep(reverse *r)
-{
-    for (int32_t s = 0; s < r->sweeps->count; s++) {
-        const double *pressure = r->pressure + (size_t)s * r->count;
-        double *next = r->pressure + ((size_t)s + 1) * r->count;
-        double *change = r->change + (size_t)s * r->count;
-        double *pushes = r->push + (size_t)s * r->count * 3;
-        push(r, pressure, pushes);
-        divergence(r, pushes, change);
-        for (size_t i = 0; i < r->count; i++) {
-            const double p =
-                pressure[i] + r->sweeps->omega[s] * (r->excess[i] + change[i]) * r->response[i];
-            next[i] = p > 0.0 ? p : 0.0;
-        }
-    }
-}
-
-/* ---- Back ---- */
-
-/* How far a neighbour that is a wall goes in the step, supports. */
-static void wall_move(const reverse *r, const neighbor *n, double move[3])
-{
-    const size_t row = ascc_hierarchy_wall_row(&r->state->hierarchy, n->at);
-    for (size_t c = 0; c < 3; c++)
-        move[c] =
-            c < r->d ? r->moving[row * r->d + c] * r->state->motion->time_step * r->unit : 0.0;
-}
-
-/* What walls that move take from divergences. */
-static void add_inflow(reverse *r)
-{
-    for (size_t i = 0; r->moving && i < r->count; i++)
-        for (size_t k = r->start[i]; k < r->start[i + 1]; k++) {
-            double move[3];
-            if (r->pair[k].fluid)
-                continue;
-            wall_move(r, &r->pair[k], move);
-            r->excess[i] -= dot(r->pair[k].g, move);
-        }
-}
-
-/* The gradients of pairs that this has. */
-static void pass_inflow(reverse *r)
-{
-    for (size_t i = 0; r->moving && i < r->count; i++)
-        for (size_t k = r->start[i]; k < r->start[i + 1]; k++) {
-            double move[3];
-            if (r->pair[k].fluid)
-                continue;
-            wall_move(r, &r->pair[k], move);
-            for (int c = 0; c < 3; c++)
-                r->pair[k].by_g[c] -= r->by_excess[i] * move[c];
-        }
-}
-
-/* Gradients of pairs that a divergence of these moves has. */
-static void pass_divergence(reverse *r, const double *move, const double *by_change)
-{
-    for (size_t i = 0; i < r->count; i++)
-        for (size_t k = r->start[i]; k < r->start[i + 1]; k++) {
-            neighbor *n = &r->pair[k];
-            for (size_t c = 0; c < 3; c++)
-                n->by_g[c] +=
-                    by_change[i] * (move[i * 3 + c] - (n->fluid ? move[n->at * 3 + c] : 0.0));
-        }
-}
-
-/* Gradients of pairs that a sweep has: its divergence, and the pushes before that by these pressures. */
-static void pass_sweep(reverse *r, const double *move, const double *by_change,
-                       const double *pressure, const double *by_push)
-{
-    for (size_t i = 0; i < r->count; i++)
-        for (size_t k = r->start[i]; k < r->start[i + 1]; k++) {
-            neighbor *n = &r->pair[k];
-            const double p = pressure[i] + (n->fluid ? pressure[n->at] : 0.0);
-            for (size_t c = 0; c < 3; c++)
-                n->by_g[c] +=
-                    by_change[i] * (move[i * 3 + c] - (n->fluid ? move[n->at * 3 + c] : 0.0)) -
-                    p * by_push[i * 3 + c];
-        }
-}
-
-/* Back through sweep s: by_pressure of what it left becomes that of what it began with. */
-static void sweep_back(reverse *r, int32_t s)
-{
-    const double *pressure = r->pressure + (size_t)s * r->count, *next = pressure + r->count;
-    const double *change = r->change + (size_t)s * r->count;
-    const double *pushes = r->push + (size_t)s * r->count * 3;
-    double *by_change = r->scratch, *by_push = r->by_push;
-    for (size_t i = 0; i < r->count; i++) {
-        const double by = next[i] > 0.0 ? r->sweeps->omega[s] * r->by_pressure[i] : 0.0;
-        if (!(next[i] > 0.0))
-            r->by_pressure[i] = 0.0;
-        r->by_response[i] += by * (r->excess[i] + change[i]);
-        by_change[i] = by * r->response[i];
-        r->by_excess[i] += by_change[i];
-    }
-    push(r, by_change, by_push);
-    for (size_t k = 0; k < 3 * r->count; k++)
-        by_push[k] = -by_push[k];
-    pass_sweep(r, pushes, by_change, pressure, by_push);
-    divergence(r, by_push, r->scratch);
-    for (size_t i = 0; i < r->count; i++)
-        r->by_pressure[i] -= r->scratch[i];
-}
-
-/* M a for M = along u u^T + across (1 - u u^T). */
-static void bend(const double u[3], double along, double across, const double a[3], double to[3])
-{
-    const double radial = dot(u, a);
+    const float radial = (along - across) * dot(u, a);
     for (int c = 0; c < 3; c++)
-        to[c] = across * a[c] + (along - across) * radial * u[c];
+        to[c] = across * a[c] + radial * u[c];
 }
+
+/* To the places of both sides from the gradient of the vector between them. */
+static void add_places(const reverse *r, size_t i, size_t j, const float by_difference[3])
+{
+    for (size_t c = 0; c < 3; c++) {
+        r->by_place[i * 3 + c] -= by_difference[c];
+        r->by_place[j * 3 + c] += by_difference[c];
+    }
+}
+
+/* ---- What is applied ---- */
 
 /* The gradient of a correction before it was turned to the line of the places before the step; that of the
  * line is added to these. */
-static void unturn(reverse *r, size_t i, size_t j, const double correction[3], double by[3])
+static void unturn(const reverse *r, size_t i, size_t j, const float correction[3], float by[3])
 {
-    double line[3], by_line[3], square = 0.0;
+    double line[3], square = 0.0, along = 0.0, turned = 0.0;
     for (size_t c = 0; c < 3; c++) {
         line[c] = r->before[j * 3 + c] - r->before[i * 3 + c];
         square += line[c] * line[c];
+        along += line[c] * (double)by[c];
+        turned += line[c] * (double)correction[c];
     }
     const double scale = square > 0.0 ? 1.0 / square : 0.0;
-    const double along = dot(line, by) * scale, turned = dot(line, correction) * scale;
+    along *= scale;
+    turned *= scale;
     for (size_t c = 0; c < 3; c++) {
-        by_line[c] = by[c] * turned + correction[c] * along - 2.0 * along * turned * line[c];
-        r->by_before[i * 3 + c] -= by_line[c];
-        r->by_before[j * 3 + c] += by_line[c];
-        by[c] = along * line[c];
+        const double by_line =
+            (double)by[c] * turned + (double)correction[c] * along - 2.0 * along * turned * line[c];
+        r->by_before[i * 3 + c] -= by_line;
+        r->by_before[j * 3 + c] += by_line;
+        by[c] = (float)(along * line[c]);
     }
 }
 
-static double share_of_limit(const double correction[3], double limit)
+/* The gradient of a correction before it was limited. */
+static void unlimit(const float correction[3], float limit, float by[3])
 {
-    const double size = sqrt(dot(correction, correction));
-    return size > limit ? limit / size : 1.0;
-}
-
-/* The gradient of a correction before it was limited to this share. */
-static void unlimit(const double correction[3], double share, double by[3])
-{
-    if (share == 1.0)
+    const float square = dot(correction, correction);
+    if (!(square > limit * limit))
         return;
-    const double along = dot(correction, by) / dot(correction, correction);
+    const float share = limit / sqrtf(square), along = dot(correction, by) / square;
     for (int c = 0; c < 3; c++)
         by[c] = share * (by[c] - along * correction[c]);
 }
 
-static void add_place(reverse *r, size_t i, const neighbor *n, const double by_difference[3])
+/* Pairs of the fluid count as if nothing were turned, limited or repelled: what these change. by: of both sides, the
+ * difference. */
+static void mend_pair(const reverse *r, size_t i, const batch *b, size_t k, float pressure)
 {
+    const size_t j = b->neighbor[k];
+    const float u[3] = {b->x[k], b->y[k], b->z[k]}, q = b->distance[k];
+    const float lack = r->repulsion - q, apart = lack > 0.0f ? r->share * lack : 0.0f;
+    const float size = apart - pressure * b->slope[k];
+    float correction[3], by[3], one[3], rest[3], back[3];
     for (size_t c = 0; c < 3; c++) {
-        r->by_place[i * 3 + c] -= by_difference[c];
-        if (n->fluid)
-            r->by_place[n->at * 3 + c] += by_difference[c];
+        correction[c] = -size * u[c];
+        one[c] = by[c] = r->by[i * 4 + c] - r->by[j * 4 + c];
+    }
+    if (r->before) {
+        const float length = fabsf(size), share = length > r->limit ? r->limit / length : 1.0f;
+        for (int c = 0; c < 3; c++)
+            back[c] = share * correction[c];
+        unturn(r, i, j, back, one);
+    }
+    unlimit(correction, r->limit, one);
+    for (int c = 0; c < 3; c++)
+        rest[c] = by[c] - one[c];
+    const float by_pressure = -b->slope[k] * dot(u, rest);
+    r->by_pressure[i] += by_pressure;
+    r->by_pressure[j] += by_pressure;
+    bend(u, -b->curvature[k] * pressure, -b->slope[k] / q * pressure, rest, back);
+    add_places(r, i, j, back);
+    if (apart > 0.0f) {
+        bend(u, r->share, -apart / q, one, back);
+        add_places(r, i, j, back);
     }
 }
 
-/* Back through the one application of the last pressures, whose gradient is by: pair by pair, for each
- * side on its own. */
-static void apply_back(reverse *r, const double *by)
+static void mend_pairs(const reverse *r, size_t i, const float *pressure)
 {
-    const double *pressure = r->pressure + (size_t)r->sweeps->count * r->count;
-    const double share = 0.5 * r->constants->stiffness;
-    for (size_t i = 0; i < r->count; i++)
-        for (size_t k = r->start[i]; k < r->start[i + 1]; k++) {
-            neighbor *n = &r->pair[k];
-            const double p = pressure[i] + (n->fluid ? pressure[n->at] : 0.0);
-            const double lack = n->fluid ? r->repulsion - n->distance : 0.0;
-            const double apart = lack > 0.0 ? share * lack : 0.0;
-            double correction[3], one[3], back[3];
-            if (!n->fluid && pressure[i] == 0.0)
-                continue;
-            memcpy(one, by + i * 3, sizeof one);
-            for (int c = 0; c < 3; c++)
-                correction[c] = -(p * n->g[c] + apart * n->u[c]);
-            const double limited = share_of_limit(correction, n->limit);
-            if (r->before && n->fluid) {
-                for (int c = 0; c < 3; c++)
-                    back[c] = limited * correction[c];
-                unturn(r, i, n->at, back, one);
-            }
-            unlimit(correction, limited, one);
-            const double by_pressure = -dot(n->g, one);
-            r->by_pressure[i] += by_pressure;
-            if (n->fluid)
-                r->by_pressure[n->at] += by_pressure;
-            for (int c = 0; c < 3; c++)
-                n->by_g[c] -= p * one[c];
-            if (apart > 0.0 && n->distance > 0.0) {
-                bend(n->u, share, -apart / n->distance, one, back);
-                add_place(r, i, n, back);
-            }
-        }
+    batch b;
+    for (size_t at = r->trace->pairs.start[i]; next_pairs(r, i, &at, &b);)
+        for (size_t k = 0; k < b.count; k++)
+            mend_pair(r, i, &b, k, pressure[i] + pressure[b.neighbor[k]]);
 }
 
-/* From gradients of pairs, densities and responses to places. */
-static void geometry_back(reverse *r, bool densities)
+static void mend_walls(const reverse *r, size_t i, float pressure)
 {
-    for (size_t i = 0; i < r->count; i++) {
-        const double by_square = -r->by_response[i] * r->response[i] * r->response[i];
-        for (size_t k = r->start[i]; k < r->start[i + 1]; k++) {
-            neighbor *n = &r->pair[k];
-            double by_difference[3];
+    batch b;
+    for (size_t at = 0; next_walls(r, i, &at, &b);)
+        for (size_t k = 0; k < b.count; k++) {
+            const float u[3] = {b.x[k], b.y[k], b.z[k]};
+            const float limit = r->limit * r->trace->wall_volume[b.neighbor[k]] / r->amount;
+            float correction[3], one[3], rest[3], back[3];
+            if (b.slope[k] == 0.0f)
+                continue;
+            for (size_t c = 0; c < 3; c++) {
+                correction[c] = pressure * b.slope[k] * u[c];
+                one[c] = r->by[i * 4 + c];
+            }
+            unlimit(correction, limit, one);
             for (size_t c = 0; c < 3; c++)
-                n->by_g[c] += 2.0 * by_square * (r->own[i * 3 + c] + (n->fluid ? n->g[c] : 0.0));
-            if (n->distance == 0.0)
-                continue;
-            bend(n->u, -n->curvature, -n->slope / n->distance, n->by_g, by_difference);
-            for (int c = 0; c < 3; c++) /* density falls with distance as g tells */
-                by_difference[c] -= densities ? r->by_excess[i] * n->g[c] : 0.0;
-            add_place(r, i, n, by_difference);
+                rest[c] = r->by[i * 4 + c] - one[c];
+            r->by_pressure[i] -= b.slope[k] * dot(u, rest);
+            bend(u, -b.curvature[k] * pressure, -b.slope[k] / b.distance[k] * pressure, rest, back);
+            for (size_t c = 0; c < 3; c++)
+                r->by_place[i * 3 + c] -= back[c];
         }
+}
+
+/* Can a pair of this row be turned, limited or repelled? Slopes are at most 2 volumes. */
+static bool is_special(const reverse *r, size_t i, const float *pressure)
+{
+    const ascc_gradients *pairs = &r->trace->pairs;
+    float most = pressure[i];
+    if (r->before || (r->repulsion > 0.0f && r->trace->near[i]))
+        return true;
+    for (size_t k = pairs->start[i]; k < pairs->end[i]; k++)
+        most = pressure[pairs->neighbor[k]] > most ? pressure[pairs->neighbor[k]] : most;
+    return 2.0f * r->amount * (pressure[i] + most) > 0.99f * r->limit;
+}
+
+static side *next_side(reverse *r)
+{
+    return r->side + r->used++;
+}
+
+/* Back through the one application of the last pressures. */
+static void apply_back(reverse *r)
+{
+    const float *pressure = r->trace->pressure + (size_t)r->sweeps->count * r->count;
+    side *to = next_side(r);
+    r->state->tools.kernels->divergence(&r->trace->pairs, 0, r->count, r->trace->own, r->by,
+                                        r->by_pressure);
+    for (size_t i = 0; i < r->count; i++) {
+        r->by_pressure[i] = -r->by_pressure[i];
+        to[i * r->sides] = (side){.by_push = {-r->by[i * 4], -r->by[i * 4 + 1], -r->by[i * 4 + 2]},
+                                  .pressure = pressure[i]};
+    }
+    for (size_t i = 0; i < r->count; i++) {
+        if (is_special(r, i, pressure))
+            mend_pairs(r, i, pressure);
+        if (2.0f * r->amount * pressure[i] > 0.99f * r->limit)
+            mend_walls(r, i, pressure[i]);
     }
 }
 
-static bool take_memory(reverse *r)
+/* ---- Sweeps ---- */
+
+/* Back through sweep s: by_pressure of what it left becomes that of what it began with. */
+static void sweep_back(reverse *r, int32_t s)
 {
-    const size_t sweeps = (size_t)r->sweeps->count;
-    r->place = zeros(r, 3);
-    r->own = zeros(r, 3);
-    r->excess = zeros(r, 1);
-    r->response = zeros(r, 1);
-    r->pressure = zeros(r, sweeps + 1);
-    r->push = zeros(r, 3 * sweeps);
-    r->change = zeros(r, sweeps);
-    r->by_push = zeros(r, 3);
-    r->by_pressure = zeros(r, 1);
-    r->by_excess = zeros(r, 1);
-    r->by_response = zeros(r, 1);
-    r->by_place = zeros(r, 3);
-    r->scratch = zeros(r, 3);
-    return r->place && r->own && r->excess && r->response && r->pressure && r->push && r->change &&
-           r->by_push && r->by_pressure && r->by_excess && r->by_response && r->by_place &&
-           r->scratch && take_pairs(r);
+    const ascc_relaxation_trace *t = r->trace;
+    const ascc_kernels *kernels = r->state->tools.kernels;
+    const float *pressure = t->pressure + (size_t)s * r->count, *next = pressure + r->count;
+    const float *change = t->change + (size_t)s * r->count;
+    const float *pushes = t->push + (size_t)s * r->count * 4;
+    const float omega = (float)r->sweeps->omega[s];
+    const bool moved = s > 0 || t->guessed;
+    for (size_t i = 0; i < r->count; i++) {
+        r->by_pressure[i] = next[i] > 0.0f ? r->by_pressure[i] : 0.0f;
+        const float by = omega * r->by_pressure[i];
+        r->by_response[i] += by * (t->excess[i] + (moved ? change[i] : 0.0f));
+        r->by_change[i] = by * t->response[i];
+        r->by_excess[i] += r->by_change[i];
+    }
+    if (!moved)
+        return;
+    kernels->push(&t->pairs, 0, r->count, r->by_change, t->own, r->by_push);
+    kernels->divergence(&t->pairs, 0, r->count, t->own, r->by_push, r->divergence);
+    side *to = next_side(r);
+    for (size_t i = 0; i < r->count; i++) {
+        side *one = &to[i * r->sides];
+        memcpy(one->move, pushes + i * 4, sizeof one->move);
+        one->by_change = r->by_change[i];
+        memcpy(one->by_push, r->by_push + i * 4, sizeof one->by_push);
+        one->pressure = pressure[i];
+        r->by_pressure[i] += r->divergence[i];
+    }
 }
+
+static void sweeps_back(reverse *r)
+{
+    for (int32_t s = r->sweeps->count; s > 0; s--)
+        sweep_back(r, s - 1);
+}
+
+/* ---- Places ---- */
+
+/* Responses and, if they are what sweeps reduced, densities. */
+static void fill_heads(const reverse *r, bool densities)
+{
+    const ascc_relaxation_trace *t = r->trace;
+    for (size_t i = 0; i < r->count; i++) {
+        head *to = &r->head[i];
+        to->twice = -2.0f * r->by_response[i] * t->response[i] * t->response[i];
+        for (int c = 0; c < 3; c++)
+            to->response[c] = to->twice * t->own[c][i];
+        to->density = densities ? r->by_excess[i] : 0.0f;
+    }
+}
+
+/* Adds what a pair's gradient has from all sweeps, both sides together. */
+static void add_sides(const side *restrict a, const side *restrict b, size_t count,
+                      float to[restrict 3])
+{
+    for (size_t s = 0; s < count; s++) {
+        const float change = a[s].by_change + b[s].by_change;
+        const float pressure = a[s].pressure + b[s].pressure;
+        for (int c = 0; c < 3; c++)
+            to[c] += change * (a[s].move[c] - b[s].move[c]) +
+                     pressure * (a[s].by_push[c] - b[s].by_push[c]);
+    }
+}
+
+static void pass_pairs(const reverse *r, size_t i, batch *b)
+{
+    const side *own = r->side + i * r->sides;
+    const head *here = &r->head[i];
+    for (size_t at = r->trace->pairs.start[i]; next_pairs(r, i, &at, b);)
+        for (size_t k = 0; k < b->count; k++) {
+            const size_t j = b->neighbor[k];
+            const head *there = &r->head[j];
+            const float u[3] = {b->x[k], b->y[k], b->z[k]};
+            float by[3], by_difference[3];
+            for (int c = 0; c < 3; c++)
+                by[c] = here->response[c] - there->response[c];
+            add_sides(own, r->side + j * r->sides, r->used, by);
+            bend(u, -b->curvature[k], -b->slope[k] / b->distance[k], by, by_difference);
+            const float radial = b->slope[k] * (b->curvature[k] * (here->twice + there->twice) +
+                                                (here->density + there->density));
+            for (int c = 0; c < 3; c++)
+                by_difference[c] += radial * u[c];
+            add_places(r, i, j, by_difference);
+        }
+}
+
+/* The same for the row's side alone; and what walls that move add to its divergence. */
+static void pass_walls(const reverse *r, size_t i, batch *b)
+{
+    const side *own = r->side + i * r->sides, none[ASCC_MAX_SWEEPS + 2] = {0};
+    const head *here = &r->head[i];
+    const float *const *move = r->trace->wall_move;
+    float all[3] = {here->response[0], here->response[1], here->response[2]};
+    add_sides(own, none, r->used, all);
+    for (size_t at = 0; next_walls(r, i, &at, b);)
+        for (size_t k = 0; k < b->count; k++) {
+            const float u[3] = {b->x[k], b->y[k], b->z[k]};
+            float by[3], by_difference[3];
+            if (b->slope[k] == 0.0f)
+                continue;
+            for (int c = 0; c < 3; c++)
+                by[c] = all[c] - (move[0] ? r->by_excess[i] * move[c][b->neighbor[k]] : 0.0f);
+            bend(u, -b->curvature[k], -b->slope[k] / b->distance[k], by, by_difference);
+            for (size_t c = 0; c < 3; c++)
+                r->by_place[i * 3 + c] -= by_difference[c] + here->density * b->slope[k] * u[c];
+        }
+}
+
+static void geometry_back(const reverse *r, bool densities)
+{
+    batch b;
+    fill_heads(r, densities);
+    for (size_t i = 0; i < r->count; i++) {
+        pass_pairs(r, i, &b);
+        if (r->wall_rows->count[i])
+            pass_walls(r, i, &b);
+    }
+}
+
+/* ---- Rounds ---- */
 
 static bool open_reverse(reverse *r, const ascc_step_state *state, ascc_arena *arena,
-                         const ascc_sweeps *sweeps, const ascc_relaxation_round *round,
-                         const double *position)
+                         const ascc_sweeps *sweeps, const ascc_relaxation_trace *trace,
+                         const ascc_rows *wall_rows)
 {
     const ascc_relaxation *constants = &state->network->plan->relaxation;
     *r = (reverse){.state = state,
                    .constants = constants,
                    .sweeps = sweeps,
-                   .rows = round->rows,
+                   .wall_rows = wall_rows,
+                   .trace = trace,
                    .arena = arena,
                    .count = state->hierarchy.set[ASCC_SET_FLUID].count,
                    .d = (size_t)state->particles->dimension,
-                   .unit = state->length_unit / constants->support};
-    if (!take_memory(r))
+                   .unit = state->length_unit / constants->support,
+                   .limit = (float)(constants->limit / constants->support),
+                   .amount = (float)constants->amount,
+                   .share = (float)(0.5 * constants->stiffness),
+                   .inverse_support = (float)(state->hierarchy.scale.unit / constants->support),
+                   .sides = (size_t)sweeps->count + 2};
+    float **const numbers[] = {&r->by_pressure, &r->by_change, &r->by_excess, &r->by_response,
+                               &r->divergence};
+    bool room = true;
+    for (size_t i = 0; i < sizeof numbers / sizeof *numbers; i++)
+        room &= (*numbers[i] = zeros(r, 1)) != NULL;
+    r->side = ascc_arena_take(arena, r->count, r->sides * sizeof *r->side);
+    r->head = ascc_arena_take(arena, r->count, sizeof *r->head);
+    r->by_push = zeros(r, 4);
+    r->by = zeros(r, 4);
+    r->by_place = zeros(r, 3);
+    return room && r->side && r->head && r->by_push && r->by && r->by_place;
+}
+
+/* The gradient of corrections: that of velocities, a step long, and of positions, if they move these. */
+static void gather_by(const reverse *r, const double *velocity, const double *position)
+{
+    const double step = 1.0 / (r->unit * r->state->motion->time_step);
+    for (size_t i = 0; i < r->count; i++) {
+        const size_t row = host_row(r, i) * r->d;
+        for (size_t c = 0; c < r->d; c++)
+            r->by[i * 4 + c] =
+                (float)(velocity[row + c] * step + (position ? position[row + c] / r->unit : 0.0));
+    }
+}
+
+/* host[host's row][dimension] += factor * from[row][stride] */
+static void scatter(const reverse *r, const float *from, size_t stride, double factor, double *host)
+{
+    for (size_t i = 0; i < r->count; i++)
+        for (size_t c = 0; c < r->d; c++)
+            host[host_row(r, i) * r->d + c] += (double)from[i * stride + c] * factor;
+}
+
+/* Places before the step, and room for their gradients; true if corrections do not depend on them. */
+static bool find_lines(reverse *r, const double *before)
+{
+    if (!r->constants->current_direction)
+        return true;
+    double *line = ascc_arena_take(r->arena, r->count, 3 * sizeof *line);
+    r->by_before = ascc_arena_take(r->arena, r->count, 3 * sizeof *r->by_before);
+    if (!line || !r->by_before)
         return false;
-    gather(r, position, r->unit, r->place);
-    find_geometry(r);
+    memset(r->by_before, 0, r->count * 3 * sizeof *r->by_before);
+    for (size_t i = 0; i < r->count; i++)
+        for (size_t c = 0; c < 3; c++)
+            line[i * 3 + c] = c < r->d ? before[host_row(r, i) * r->d + c] * r->unit : 0.0;
+    r->before = line;
     return true;
 }
 
-/* host[host's row][dimension] += factor * from[row][3] */
-static void scatter(const reverse *r, const double *from, double factor, double *host)
+/* Pressures began with a value of the network, in its units. */
+static void guess_back(const reverse *r, double *by_guess)
 {
-    for (size_t i = 0; i < r->count; i++) {
-        const size_t row = ascc_hierarchy_host_row(&r->state->hierarchy, ASCC_SET_FLUID, i);
-        for (size_t c = 0; c < r->d; c++)
-            host[row * r->d + c] += from[i * 3 + c] * factor;
-    }
+    const double unit = ascc_step_share(r->state) / r->constants->lattice_response;
+    for (size_t i = 0; i < r->count; i++)
+        by_guess[host_row(r, i)] = unit * (double)r->by_pressure[i];
 }
 
 /* x' = x + d, v' = v + d / dt. */
@@ -502,34 +498,21 @@ static ascc_status pressure_back(const ascc_step_state *state, ascc_arena *arena
                                  const ascc_relaxation_gradients *gradients)
 {
     reverse r;
-    const bool first = round == state->relaxed.round;
-    if (!open_reverse(&r, state, arena, &state->network->plan->relaxation.pressure, round,
-                      round->position))
+    if (!open_reverse(&r, state, arena, &state->network->plan->relaxation.pressure, &round->trace,
+                      round->rows[1]) ||
+        !find_lines(&r, gradients->before))
         return ASCC_ERROR_MEMORY;
-    double *by = zeros(&r, 3), *line = zeros(&r, 3), *velocity = zeros(&r, 3);
-    r.by_before = zeros(&r, 3);
-    if (!by || !line || !velocity || !r.by_before)
-        return ASCC_ERROR_MEMORY;
-    gather(&r, gradients->position, 1.0 / r.unit, by);
-    gather(&r, gradients->velocity, 1.0 / (r.unit * state->motion->time_step), velocity);
-    for (size_t k = 0; k < 3 * r.count; k++)
-        by[k] += velocity[k];
-    if (r.constants->current_direction) {
-        gather(&r, gradients->before, r.unit, line);
-        r.before = line;
-    }
-    r.repulsion = r.constants->repulsion / r.constants->support;
-    if (first)
-        guess(&r);
-    sweep(&r);
-    apply_back(&r, by);
-    for (int32_t s = r.sweeps->count; s > 0; s--)
-        sweep_back(&r, s - 1);
-    if (first)
+    r.repulsion = (float)(r.constants->repulsion / r.constants->support);
+    gather_by(&r, gradients->velocity, gradients->position);
+    apply_back(&r);
+    sweeps_back(&r);
+    if (round->trace.guessed)
         guess_back(&r, gradients->by_guess);
     geometry_back(&r, true);
-    scatter(&r, r.by_place, r.unit, gradients->position);
-    scatter(&r, r.by_before, r.unit, gradients->by_before);
+    scatter(&r, r.by_place, 3, r.unit, gradients->position);
+    for (size_t i = 0; r.by_before && i < r.count; i++)
+        for (size_t c = 0; c < r.d; c++)
+            gradients->by_before[host_row(&r, i) * r.d + c] += r.by_before[i * 3 + c] * r.unit;
     return ASCC_OK;
 }
 
@@ -538,46 +521,36 @@ static ascc_status divergence_back(const ascc_step_state *state, ascc_arena *are
                                    const ascc_relaxation_gradients *gradients)
 {
     reverse r;
-    if (!open_reverse(&r, state, arena, &state->network->plan->relaxation.divergence,
-                      &state->relaxed.round[state->relaxed.rounds - 1], state->advance.position))
+    const ascc_relaxation_trace *trace = &state->relaxed.divergence;
+    if (!open_reverse(&r, state, arena, &state->network->plan->relaxation.divergence, trace,
+                      state->relaxed.round[state->relaxed.rounds - 1].rows[1]))
         return ASCC_ERROR_MEMORY;
-    double *by = zeros(&r, 3), *move = zeros(&r, 3);
-    if (!by || !move)
-        return ASCC_ERROR_MEMORY;
-    const double step = state->motion->time_step * r.unit; /* supports a step of a velocity */
-    gather(&r, gradients->velocity, 1.0 / step, by);
-    gather(&r, state->relaxed.velocity, step, move);
-    for (size_t i = 0; i < r.count; i++)
-        if (r.excess[i] < -(double)ASCC_SURFACE)
-            r.response[i] = 0.0;
-    divergence(&r, move, r.excess);
-    r.moving = state->advance.wall_velocity;
-    add_inflow(&r);
-    sweep(&r);
-    apply_back(&r, by);
-    for (int32_t s = r.sweeps->count; s > 0; s--)
-        sweep_back(&r, s - 1);
-    pass_divergence(&r, move, r.by_excess);
-    pass_inflow(&r);
+    gather_by(&r, gradients->velocity, NULL);
+    apply_back(&r);
+    sweeps_back(&r);
+    side *to = next_side(&r);
+    for (size_t i = 0; i < r.count; i++) {
+        const float *move = trace->move + i * 4;
+        to[i * r.sides] = (side){.move = {move[0], move[1], move[2]}, .by_change = r.by_excess[i]};
+    }
     geometry_back(&r, false);
-    scatter(&r, r.by_place, r.unit, gradients->position);
-    push(&r, r.by_excess, by);
-    scatter(&r, by, -step, gradients->velocity);
+    scatter(&r, r.by_place, 3, r.unit, gradients->position);
+    state->tools.kernels->push(&trace->pairs, 0, r.count, r.by_excess, trace->own, r.by_push);
+    scatter(&r, r.by_push, 4, -state->motion->time_step * r.unit, gradients->velocity);
     return ASCC_OK;
 }
 
 ascc_status ascc_relaxation_backward(const ascc_step_state *state, ascc_arena *arena,
                                      const ascc_relaxation_gradients *gradients)
 {
-    const ascc_relaxation *constants = &state->network->plan->relaxation;
     ascc_status status = ASCC_OK;
-    if (constants->divergence.count && state->relaxed.velocity) {
+    if (state->relaxed.divergence.low) {
         ascc_arena_reset(arena);
         status = divergence_back(state, arena, gradients);
     }
     for (int32_t n = state->relaxed.rounds; status == ASCC_OK && n > 0; n--) {
         const ascc_relaxation_round *round = &state->relaxed.round[n - 1];
-        if (!round->position)
+        if (!round->trace.low)
             break;
         ascc_arena_reset(arena);
         status = pressure_back(state, arena, round, gradients);
