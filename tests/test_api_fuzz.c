@@ -719,6 +719,162 @@ static void ask_wrongly(sequence *s)
     CHECK(ascc_particles_hash(s->particles) == before);
 }
 
+/* ---- Taps and drains ---- */
+
+static ascc_tap some_tap(sequence *s)
+{
+    ascc_tap tap = {.size = sizeof tap,
+                    .radius = once_in(s, 2) ? between(s, 0.0, 1.5) * spacing : 0.0,
+                    .rate = once_in(s, 2) ? between(s, 0.0, 500.0) : 0.0,
+                    .pitch = once_in(s, 3) ? between(s, 0.7, 2.0) * spacing : 0.0,
+                    .clearance = once_in(s, 3) ? between(s, 0.1, 1.2) * spacing : 0.0,
+                    .mass = once_in(s, 2) ? some_mass(s) : 0.0,
+                    .owed = once_in(s, 2) ? between(s, 0.0, 3.0) : 0.0,
+                    .emitted = below(s, 100)};
+    for (size_t c = 0; c < 3; c++) {
+        tap.position[c] = between(s, 0.0, 6.0) * spacing;
+        tap.half[c] = between(s, 0.0, 0.7) * spacing;
+        tap.velocity[c] = between(s, -1.0, 1.0);
+    }
+    return tap;
+}
+
+/* What comes out is as the tap says, and no nearer to what was there than its clearance. */
+static void check_emitted(sequence *s, const ascc_tap *tap, size_t first, size_t count)
+{
+    const double clearance = tap->clearance > 0.0 ? tap->clearance : 0.9 * spacing;
+    for (size_t i = first; i < first + count; i++) {
+        shadow_row *row = &s->row[ASCC_FLUID][i];
+        const ascc_array x = {.data = row->position, .scalar = ASCC_DOUBLE};
+        row->mass = tap->mass > 0.0 ? tap->mass : 0.125;
+        CHECK(ascc_particles_get(s->particles, ASCC_FLUID, ASCC_POSITION, i, 1, &x) == ASCC_OK);
+        for (size_t j = 0; j < first; j++) {
+            double square = 0.0;
+            for (size_t c = 0; c < s->width; c++) {
+                const double off = row->position[c] - s->row[ASCC_FLUID][j].position[c];
+                square += off * off;
+            }
+            CHECK(square >= 0.999 * clearance * clearance);
+        }
+    }
+}
+
+static void run_tap(sequence *s)
+{
+    enum { ROOM = 12 };
+    ascc_tap tap = some_tap(s);
+    const ascc_tap began = tap;
+    const size_t first = s->count[ASCC_FLUID], room = below(s, ROOM + 1);
+    uint64_t ids[ROOM];
+    size_t count = SIZE_MAX;
+    if (first + ROOM > MOST)
+        return;
+    CHECK(ascc_tap_run(s->particles, &tap, between(s, 0.0, 0.02), room, ids, &count) == ASCC_OK);
+    CHECK(count <= room && tap.emitted == began.emitted + count && tap.owed >= 0.0);
+    for (size_t i = 0; i < count; i++) {
+        CHECK(ids[i] > s->last_id);
+        s->row[ASCC_FLUID][first + i] = (shadow_row){.id = s->last_id = ids[i]};
+    }
+    check_emitted(s, &tap, first, count);
+    s->count[ASCC_FLUID] += count;
+}
+
+/* Says of a row what the header says of drains. */
+static bool is_in_drain(const sequence *s, const ascc_drain *drain, const shadow_row *row)
+{
+    double square = 0.0, along = 0.0, farthest = 0.0;
+    for (size_t c = 0; c < s->width; c++) {
+        const double off = row->position[c] - drain->position[c];
+        square += off * off;
+        along += off * drain->normal[c];
+        farthest = fmax(farthest, fabs(off) - drain->half[c]);
+    }
+    const bool in = drain->kind == ASCC_DRAIN_ALL      ? true
+                    : drain->kind == ASCC_DRAIN_BOX    ? farthest <= 0.0
+                    : drain->kind == ASCC_DRAIN_SPHERE ? square <= drain->radius * drain->radius
+                                                       : along > 0.0;
+    return in != (drain->outside != 0) && (!drain->before || row->id < drain->before);
+}
+
+static ascc_drain some_drain(sequence *s)
+{
+    ascc_drain drain = {.size = sizeof drain,
+                        .kind = (ascc_drain_kind)below(s, 4),
+                        .radius = between(s, 0.0, 2.0) * spacing,
+                        .before = once_in(s, 2) ? 1 + below(s, (size_t)s->last_id + 2) : 0};
+    drain.outside = drain.kind != ASCC_DRAIN_ALL && once_in(s, 6);
+    for (size_t c = 0; c < 3; c++) {
+        drain.position[c] = between(s, 0.0, 6.0) * spacing;
+        drain.half[c] = between(s, 0.0, 2.0) * spacing;
+        drain.normal[c] = between(s, 0.1, 1.0) * (once_in(s, 2) ? 1.0 : -1.0);
+    }
+    return drain;
+}
+
+static void run_drain(sequence *s)
+{
+    enum { ROOM = 6 };
+    const ascc_drain drain = some_drain(s);
+    const bool all = once_in(s, 6);
+    uint64_t ids[ROOM];
+    size_t count = SIZE_MAX, found = 0;
+    CHECK(ascc_drain_run(s->particles, &drain, ROOM, all ? NULL : ids, &count) == ASCC_OK);
+    for (size_t i = 0; i < s->count[ASCC_FLUID];) {
+        if ((!all && found == ROOM) || !is_in_drain(s, &drain, &s->row[ASCC_FLUID][i])) {
+            i++;
+            continue;
+        }
+        CHECK(all || ids[found] == s->row[ASCC_FLUID][i].id);
+        found++;
+        drop_row(s, ASCC_FLUID, i);
+    }
+    CHECK(count == found);
+}
+
+static void run_tap_wrongly(sequence *s)
+{
+    const uint64_t before = ascc_particles_hash(s->particles);
+    ascc_tap tap = some_tap(s);
+    ascc_drain drain = some_drain(s);
+    ascc_status wanted = ASCC_ERROR_NOT_FINITE, drained = ASCC_ERROR_NOT_FINITE;
+    double seconds = 0.01;
+    size_t count = 7;
+    switch (below(s, 6)) {
+    case 0:
+        tap.position[below(s, 3)] = bad_number(s);
+        drain.position[below(s, 3)] = bad_number(s);
+        break;
+    case 1:
+        tap.velocity[below(s, 3)] = bad_number(s);
+        drain.normal[below(s, 3)] = bad_number(s);
+        break;
+    case 2:
+        seconds = bad_number(s);
+        drain.radius = bad_number(s);
+        break;
+    case 3:
+        tap.size = drain.size = 3;
+        wanted = drained = ASCC_ERROR_ARGUMENT;
+        break;
+    case 4:
+        tap.half[below(s, 3)] = drain.half[below(s, 3)] = -spacing;
+        wanted = drained = ASCC_ERROR_ARGUMENT;
+        break;
+    default:
+        tap.half[1] = 1e9 * spacing;
+        tap.radius = 0.0;
+        wanted = ASCC_ERROR_RANGE;
+        drain.kind = (ascc_drain_kind)(4 + below(s, 3));
+        drained = ASCC_ERROR_ARGUMENT;
+        break;
+    }
+    const ascc_tap was = tap;
+    check_refused(s, ascc_tap_run(s->particles, &tap, seconds, 0, NULL, &count), wanted, before);
+    CHECK(count == 7 && tap.emitted == was.emitted && memcmp(&tap, &was, sizeof tap) == 0);
+    check_refused(s, ascc_drain_run(s->particles, &drain, 0, NULL, &count), drained, before);
+    CHECK(count == 7);
+}
+
 /* ---- Steps ---- */
 
 /* Positions after a step are the set's to choose; masses, walls and ids are not. */
@@ -1057,7 +1213,8 @@ static void run_sequence(uint64_t seed)
         set_some,        set_some,         set_wrongly,       restore_garbage, ask_wrongly,
         run_step,        run_step,         run_step,          run_step,        run_with_bad_forces,
         run_beside_twin, run_beside_twin,  run_out_of_memory, add_body,        move_body,
-        move_body,       move_wrongly,     remove_body};
+        move_body,       move_wrongly,     remove_body,       run_tap,         run_tap,
+        run_drain,       run_tap_wrongly};
     static sequence one;
     sequence *s = &one;
     open_sequence(s, seed);

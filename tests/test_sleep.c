@@ -242,6 +242,7 @@ static void what_the_host_changes_wakes_what_is_near(void **state)
     const double place[3] = {spacing, 7 * spacing, spacing}, fast[3] = {0.5, 0.0, 0.0};
     const ascc_const_array at = {.data = place, .scalar = ASCC_DOUBLE};
     const ascc_const_array velocity = {.data = fast, .scalar = ASCC_DOUBLE};
+    uint64_t drained[2];
     world w = open_asleep(&channel);
     assert_int_equal(ascc_particles_add_fluid(w.particles, 1, &at, NULL, NULL, NULL), ASCC_OK);
     assert_true(ascc_rest_count(w.particles) < 640);
@@ -261,6 +262,19 @@ static void what_the_host_changes_wakes_what_is_near(void **state)
     const uint64_t id = w.particles->id[1];
     assert_int_equal(ascc_particles_remove(w.particles, 1, &id), ASCC_OK);
     check_one_end(&w);
+
+    w = open_asleep(&channel);
+    const ascc_drain drain = {.size = sizeof drain,
+                              .kind = ASCC_DRAIN_SPHERE,
+                              .position = {spacing, spacing, spacing},
+                              .radius = 1.8 * spacing};
+    assert_int_equal(ascc_drain_run(w.particles, &drain, 2, drained, NULL), ASCC_OK);
+    assert_int_equal(w.particles->fluid_count, 638);
+    (void)run(&w, NULL, 1);
+    size_t asleep[2];
+    count_sides(w.particles, 20 * spacing, asleep);
+    assert_true(asleep[0] < 318 && asleep[1] == 320);
+    close_pool(&w);
 
     w = open_asleep(&channel);
     const double floor[3] = {spacing, 0.0, spacing}, up[3] = {0.0, 1.0, 0.0};

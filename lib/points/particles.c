@@ -416,26 +416,6 @@ static ascc_status mark_rows(const ascc_particles *particles, size_t count, cons
     return ASCC_OK;
 }
 
-/* Runs of rows around which fluid wakes one by one; where more go, all of it wakes. */
-#define MOST_RUNS 64
-
-static void disturb_marked(ascc_particles *particles, ascc_kind kind, const unsigned char *marked)
-{
-    const size_t count = ascc_particles_count(particles, kind);
-    size_t runs = 0;
-    for (size_t i = 0, end; i < count; i = end) {
-        for (end = i + 1; end < count && marked[end] == marked[i];)
-            end++;
-        if (!marked[i])
-            continue;
-        if (++runs > MOST_RUNS) {
-            ascc_rest_end(particles);
-            return;
-        }
-        ascc_rest_disturb(particles, kind, i, end - i);
-    }
-}
-
 ascc_status ascc_particles_remove(ascc_particles *particles, size_t count, const uint64_t *ids)
 {
     ASCC_FLOAT_SCOPE;
@@ -457,8 +437,8 @@ ascc_status ascc_particles_remove(ascc_particles *particles, size_t count, const
     const ascc_status status = mark_rows(particles, count, ids, marked, &message);
     if (status == ASCC_OK) {
         const size_t fluid = particles->fluid_count; /* before it shrinks */
-        disturb_marked(particles, ASCC_FLUID, marked);
-        disturb_marked(particles, ASCC_BOUNDARY, marked + fluid);
+        ascc_rest_disturb_marked(particles, ASCC_FLUID, marked);
+        ascc_rest_disturb_marked(particles, ASCC_BOUNDARY, marked + fluid);
         ascc_particles_drop_rows(particles, ASCC_FLUID, marked);
         ascc_particles_drop_rows(particles, ASCC_BOUNDARY, marked + fluid);
     }

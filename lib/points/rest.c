@@ -85,6 +85,27 @@ void ascc_rest_disturb(ascc_particles *p, ascc_kind kind, size_t first, size_t c
         ascc_release(allocator, slot, slots, sizeof *slot);
 }
 
+/* Runs of rows around which fluid wakes one by one; where more go, all of it wakes. */
+#define MOST_RUNS 64
+
+void ascc_rest_disturb_marked(ascc_particles *particles, ascc_kind kind,
+                              const unsigned char *marked)
+{
+    const size_t count = ascc_particles_count(particles, kind);
+    size_t runs = 0;
+    for (size_t i = 0, end; i < count; i = end) {
+        for (end = i + 1; end < count && marked[end] == marked[i];)
+            end++;
+        if (!marked[i])
+            continue;
+        if (++runs > MOST_RUNS) {
+            ascc_rest_end(particles);
+            return;
+        }
+        ascc_rest_disturb(particles, kind, i, end - i);
+    }
+}
+
 ascc_status ascc_particles_get_asleep(const ascc_particles *particles, size_t first, size_t count,
                                       uint8_t *asleep)
 {

@@ -28,5 +28,8 @@ void ascc_rest_end(ascc_particles *particles);
 /* Rows of a kind that the host is about to change, or has changed: fluid is awake there and one block
  * around. Without memory for the blocks all wakes. */
 void ascc_rest_disturb(ascc_particles *particles, ascc_kind kind, size_t first, size_t count);
+/* The same of rows that are marked, one byte each. */
+void ascc_rest_disturb_marked(ascc_particles *particles, ascc_kind kind,
+                              const unsigned char *marked);
 
 #endif

@@ -1,7 +1,7 @@
 /* Taps, which let fluid in where there is room, and drains, which take it out. SPDX-License-Identifier: MIT */
 #include <string.h>
 
-#include "particles.h"
+#include "rest.h"
 
 _Static_assert(sizeof(void *) != 8 || sizeof(ascc_tap) == 136, "layout is part of the ABI");
 _Static_assert(sizeof(void *) != 8 || sizeof(ascc_drain) == 104, "layout is part of the ABI");
@@ -363,8 +363,10 @@ static ascc_status run_drain(ascc_particles *particles, const ascc_drain *drain,
             ids[removed] = particles->id[row];
         removed += marked[row];
     }
-    if (removed > 0)
+    if (removed > 0) {
+        ascc_rest_disturb_marked(particles, ASCC_FLUID, marked);
         ascc_particles_drop_rows(particles, ASCC_FLUID, marked);
+    }
     ascc_release(allocator, marked, rows, 1);
     if (count != NULL)
         *count = removed;
