@@ -1,7 +1,8 @@
 #!/bin/sh
-# The stability suite on two scenes with three methods: what passes, what fails; prints TAP.
+# The stability suite on some scenes with a few methods: what passes, what fails; prints TAP.
 # $1: a build folder. SPDX-License-Identifier: MIT
 cd "$(dirname "$0")/.." || exit 1
+models=$PWD/examples/models
 stability=$(cd "${1:-build}" && pwd)/bench/stability || exit 1
 number=0
 failed=0
@@ -28,6 +29,9 @@ before
 <!-- matrix begins -->
 old
 <!-- matrix ends -->
+<!-- flat matrix begins -->
+older
+<!-- flat matrix ends -->
 after
 END
 "$stability" --quick --budget 60 --frames 8 --docs docs --methods 'SPH;DFSPH;ballistic' \
@@ -39,7 +43,7 @@ holds 'SPH holds a jet at one layer of wall' grep -qE '^jet at a sheet +SPH .* p
 holds 'free flight is seen to go through it' grep -qE '^jet at a sheet +ballistic .* through' out
 holds 'the matrix replaces the old one, and nothing else' sh -c '
     [ "$(head -n 1 docs/stability.md)" = before ] && [ "$(tail -n 1 docs/stability.md)" = after ] &&
-        ! grep -q old docs/stability.md && grep -q "| dam break | \*\*pass: 8 of 8\*\* |" docs/stability.md'
+        ! grep -qx old docs/stability.md && grep -qx older docs/stability.md && grep -q "| dam break | \*\*pass: 8 of 8\*\* |" docs/stability.md'
 holds 'the picture is whole' sh -c 'tail -n 1 docs/figures/stability.svg | grep -qF "</svg>"'
 "$stability" --quick --budget 0.000001 --methods SPH --scenes 'still column' --jobs 1 >out 2>err
 holds 'a cell out of time does not pass' grep -q 'no failure in 0 of' out
@@ -47,6 +51,19 @@ holds 'a cell out of time does not pass' grep -q 'no failure in 0 of' out
     --scenes 'single particle' --jobs 1 >out 2>err
 holds 'a model file is a method more' grep -qE '^single particle +demo .* pass: 2 of 2' out
 holds 'a file that is not there fails its cells' grep -qE '^single particle +where .* frame 0 of 2: model' out
+"$stability" --quick --frames 24 --methods ballistic --model "$models/pbf3d.safetensors" --jobs 1 \
+    --scenes 'paddle;thin cup;tap' >out 2>err
+holds 'a paddle leaves nothing behind' grep -qE '^paddle +pbf3d .* pass: 24 of 24' out
+holds 'a cup of one sheet holds what is in it' grep -qE '^thin cup +pbf3d .* pass: 24 of 24' out
+holds 'free flight leaves it' grep -qE '^thin cup +ballistic .* escaped$' out
+holds 'what a method cannot do is no pass' [ "$(grep -c ' cannot: ' out)" = 2 ]
+"$stability" --quick --dimension 2 --frames 20 --docs docs --methods ballistic --model "$models/pbf2d.safetensors" \
+    --scenes 'turned tank;sideways gravity;dam break' >out 2>err
+holds 'a flat tank may turn' grep -qE '^turned tank +pbf2d .* pass: 20 of 20' out
+holds 'flat scenes turn as deep ones do' grep -qE '^sideways gravity +pbf2d .* pass: 20 of 20' out
+holds 'the flat matrix replaces the old one, and not the deep one' sh -c '
+    ! grep -qx older docs/stability.md && grep -q "run in 2D" docs/stability.md && grep -q "run in 3D" docs/stability.md &&
+        [ "$(tail -n 1 docs/stability.md)" = after ]'
 "$stability" --scenes nowhere >out 2>err
 holds 'a scene that is not there is an error' [ $? -eq 1 ]
 echo "1..$number"

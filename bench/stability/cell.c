@@ -30,54 +30,152 @@ void cell_say(cell *c, const char *format, ...)
     va_end(arguments);
 }
 
-bool cell_open(cell *c, const world *w, simulation *s)
+/* Rows of three numbers as rows of two; at one place, too. */
+static void flatten(const double *from, size_t rows, double *to)
+{
+    for (size_t i = 0; i < rows; i++) {
+        to[2 * i] = from[3 * i];
+        to[2 * i + 1] = from[3 * i + 1];
+    }
+}
+
+static void deepen(const double *from, size_t rows, double *to)
+{
+    for (size_t i = 0; i < rows; i++) {
+        to[3 * i] = from[2 * i];
+        to[3 * i + 1] = from[2 * i + 1];
+        to[3 * i + 2] = 0.0;
+    }
+}
+
+static bool is_flat(const simulation *s)
+{
+    return s->scene.dimension == 2;
+}
+
+/* Room for what is read of so many particles; what was there stays. */
+static bool make_room(simulation *s, size_t rows)
+{
+    double **const arrays[] = {&s->position, &s->velocity, &s->flat[2], &s->flat[3]};
+    for (size_t k = 0; k < 4; k++) {
+        double *grown = realloc(*arrays[k], (rows + 1) * 3 * sizeof *grown);
+        if (!grown)
+            return false;
+        *arrays[k] = grown;
+    }
+    return true;
+}
+
+/* The scene as the method has it. */
+static bool hand_over(simulation *s)
+{
+    const size_t walls = s->scene.wall_count;
+    if (!is_flat(s))
+        return true;
+    for (int k = 0; k < 2; k++) {
+        s->flat[k] = malloc((walls + 1) * 2 * sizeof **s->flat);
+        if (!s->flat[k])
+            return false;
+        flatten(k ? s->scene.normal : s->scene.wall, walls, s->flat[k]);
+    }
+    s->scene.wall = s->flat[0];
+    s->scene.normal = s->flat[1];
+    return true;
+}
+
+/* Rows in the method's layout: in one of the buffers for what is read. */
+static const double *as_method(const simulation *s, const double *rows, size_t count, int buffer)
+{
+    if (!is_flat(s))
+        return rows;
+    flatten(rows, count, s->flat[buffer]);
+    return s->flat[buffer];
+}
+
+bool cell_open(cell *c, world *w, simulation *s)
 {
     ascc_method_error error = {"refused"};
-    const size_t bytes = (w->scene.fluid_count + 1) * 3 * sizeof(double);
-    *s = (simulation){.world = w, .position = malloc(bytes), .velocity = malloc(bytes)};
-    if (!s->position || !s->velocity)
+    const size_t count = w->scene.fluid_count;
+    *s = (simulation){.world = w, .scene = w->scene};
+    if (!make_room(s, count) || !hand_over(s))
         return cell_fail(c, "no memory");
-    memcpy(s->position, w->position, bytes - 3 * sizeof(double));
-    memcpy(s->velocity, w->velocity, bytes - 3 * sizeof(double));
-    if (!c->method->open(c->settings, &w->scene, &s->state, &error))
+    memcpy(s->position, w->position, count * 3 * sizeof(double));
+    memcpy(s->velocity, w->velocity, count * 3 * sizeof(double));
+    if (!c->method->open(c->settings, &s->scene, &s->state, &error))
         return cell_fail(c, "%.100s", error.text);
-    if (!c->method->set(s->state, w->position, w->velocity, ASCC_VELOCITY_STORED, &error))
+    if (!c->method->set(s->state, as_method(s, w->position, count, 2),
+                        as_method(s, w->velocity, count, 3), ASCC_VELOCITY_STORED, &error))
         return cell_fail(c, "%.100s", error.text);
     return true;
 }
 
-bool cell_has_bodies(cell *c)
+static bool cannot(cell *c, const char *what)
 {
-    if (c->method->move_body)
-        return true;
     c->verdict = NONE;
-    snprintf(c->text, sizeof c->text, "no bodies that move");
+    snprintf(c->text, sizeof c->text, "cannot: %s", what);
     return false;
 }
 
-bool cell_move_body(cell *c, simulation *s, world *w, double mass, double velocity[3])
+bool cell_has_bodies(cell *c)
 {
-    const ascc_method_scene *scene = &w->scene;
+    return c->method->drive_body || cannot(c, "no bodies that move");
+}
+
+bool cell_takes_fluid(cell *c)
+{
+    return c->method->add_fluid || cannot(c, "no fluid on the way");
+}
+
+bool cell_drive_body(cell *c, simulation *s, const double velocity[3], const double spin[3])
+{
     ascc_method_error error = {"the body cannot be moved"};
-    double impulse[3], by[3];
+    world_move_body(s->world, velocity, spin, s->scene.time_step);
+    return c->method->drive_body(s->state, velocity, spin, &error) ||
+           cell_fail(c, "%.100s", error.text);
+}
+
+void cell_body_impulse(const cell *c, const simulation *s, double impulse[3])
+{
+    memset(impulse, 0, 3 * sizeof *impulse);
     c->method->body_impulse(s->state, impulse);
-    for (int a = 0; a < 3; a++) {
-        velocity[a] += impulse[a] / mass + scene->time_step * scene->gravity[a];
-        by[a] = scene->time_step * velocity[a];
-        for (size_t i = scene->wall_count - scene->body_count; i < scene->wall_count; i++)
-            w->wall[3 * i + (size_t)a] += by[a];
-    }
-    return c->method->move_body(s->state, by, &error) || cell_fail(c, "%.100s", error.text);
+}
+
+bool cell_free_body(cell *c, simulation *s, double mass, double velocity[3])
+{
+    const double still[3] = {0.0, 0.0, 0.0};
+    double impulse[3];
+    cell_body_impulse(c, s, impulse);
+    for (int a = 0; a < s->scene.dimension; a++)
+        velocity[a] += impulse[a] / mass + s->scene.time_step * s->scene.gravity[a];
+    return cell_drive_body(c, s, velocity, still);
+}
+
+bool cell_add_fluid(cell *c, simulation *s, size_t count, const double *position,
+                    const double *velocity)
+{
+    ascc_method_error error = {"no fluid can be added"};
+    if (!make_room(s, s->scene.fluid_count + count))
+        return cell_fail(c, "no memory");
+    if (!c->method->add_fluid(s->state, count, as_method(s, position, count, 2),
+                              as_method(s, velocity, count, 3), &error))
+        return cell_fail(c, "%.100s", error.text);
+    for (size_t i = 0; i < count; i++)
+        world_add(s->world, position + 3 * i, velocity + 3 * i);
+    s->scene.fluid_count += count;
+    return true;
 }
 
 void cell_close(cell *c, simulation *s)
 {
     if (s->state)
         c->method->close(s->state);
+    for (int k = 0; k < 4; k++)
+        free(s->flat[k]);
     free(s->position);
     free(s->velocity);
 }
 
+/* Flat rows lie at z = 0: but for densities, measures are the same. */
 static ascc_measure_set set_of(const simulation *s)
 {
     return (ascc_measure_set){.dimension = 3,
@@ -85,6 +183,17 @@ static ascc_measure_set set_of(const simulation *s)
                               .position = s->position,
                               .velocity = s->velocity,
                               .particle_mass = s->world->scene.mass};
+}
+
+static void read_fluid(const cell *c, simulation *s)
+{
+    const size_t count = s->scene.fluid_count;
+    c->method->read(s->state, is_flat(s) ? s->flat[2] : s->position,
+                    is_flat(s) ? s->flat[3] : s->velocity);
+    if (!is_flat(s))
+        return;
+    deepen(s->flat[2], count, s->position);
+    deepen(s->flat[3], count, s->velocity);
 }
 
 bool cell_step(cell *c, simulation *s)
@@ -100,7 +209,7 @@ bool cell_step(cell *c, simulation *s)
     c->frame = s->frame > c->frame ? s->frame : c->frame;
     if (!c->method->advance(s->state, &error))
         return cell_fail(c, "%.100s", error.text);
-    c->method->read(s->state, s->position, s->velocity);
+    read_fluid(c, s);
     const ascc_measure_set set = set_of(s);
     const size_t bad = ascc_measure_non_finite(&set);
     return bad == 0 || cell_fail(c, "%zu not finite", bad);
@@ -138,17 +247,40 @@ bool cell_nothing_clumps(cell *c, const simulation *s)
            cell_fail(c, "%.2g %% of pairs < spacing / 5", 100.0 * pairs.tight_fraction);
 }
 
-double cell_density(const simulation *s)
+double cell_nearest_pair(const simulation *s)
+{
+    const ascc_measure_set set = set_of(s);
+    ascc_measure_pair_spacing pairs = {0};
+    return ascc_measure_pairs(&set, s->world->scene.spacing, 1, &pairs) == ASCC_OK
+               ? pairs.min_distance
+               : (double)NAN;
+}
+
+double cell_density_between(const simulation *s, const double low[3], const double high[3])
 {
     const ascc_measure_set set = set_of(s);
     double sum = 0.0, *density = calloc(set.count + 1, sizeof *density);
+    size_t count = 0;
     if (!density ||
         ascc_measure_density(&set, 0, NULL, 2.0 * s->world->scene.spacing, 1, density) != ASCC_OK)
         sum = NAN;
-    for (size_t i = 0; i < set.count && density; i++)
-        sum += density[i];
+    for (size_t i = 0; i < set.count && density; i++) {
+        const double *x = s->position + 3 * i;
+        bool in = true;
+        for (int a = 0; a < s->scene.dimension; a++)
+            in = in && x[a] >= low[a] && x[a] <= high[a];
+        sum += in ? density[i] : 0.0;
+        count += in;
+    }
     free(density);
-    return sum / (double)set.count / ascc_measure_rest_density(3);
+    return sum / (double)count / ascc_measure_rest_density(s->scene.dimension);
+}
+
+double cell_density(const simulation *s)
+{
+    const double low[3] = {-INFINITY, -INFINITY, -INFINITY},
+                 high[3] = {INFINITY, INFINITY, INFINITY};
+    return cell_density_between(s, low, high);
 }
 
 bool cell_slower_than(cell *c, const simulation *s, double speed)

@@ -16,6 +16,7 @@ typedef enum verdict {
 typedef struct cell {
     const ascc_method *method;
     const char *settings;
+    int dimension;
     long frames;          /* wanted */
     long frame;           /* run: of the longest simulation of the scene */
     double budget, start; /* CPU seconds */
@@ -23,9 +24,11 @@ typedef struct cell {
     char text[128]; /* why it failed, or a remark on a pass */
 } cell;
 
-/* A running simulation of a world, which must outlive it. */
+/* A running simulation of a world, which must outlive it. Rows are of three numbers, as the world's. */
 typedef struct simulation {
-    const world *world;
+    world *world;
+    ascc_method_scene scene; /* the method's: rows of two numbers in a flat world */
+    double *flat[4];         /* walls, normals, and what is read */
     void *state;
     long frame;
     double *position, *velocity;
@@ -46,12 +49,19 @@ void cell_say(cell *c, const char *format, ...)
     ;
 
 /* False: the method refused the world, and the cell has failed. Close either way. */
-bool cell_open(cell *c, const world *w, simulation *s);
-/* False: the method moves no bodies, and the cell says so. */
+bool cell_open(cell *c, world *w, simulation *s);
+/* False: the method moves no bodies, or takes no fluid on the way, and the cell says so. */
 bool cell_has_bodies(cell *c);
-/* The body of the world at its mass, kg, for a frame: what the fluid gave it in the last one and gravity.
- * Moves its wall points in the world as well. */
-bool cell_move_body(cell *c, simulation *s, world *w, double mass, double velocity[3]);
+bool cell_takes_fluid(cell *c);
+/* Moves the body of the world in the next frame; its wall points are then where it ends. */
+bool cell_drive_body(cell *c, simulation *s, const double velocity[3], const double spin[3]);
+/* The body at its mass, kg, for a frame: what the fluid gave it in the last one and gravity. */
+bool cell_free_body(cell *c, simulation *s, double mass, double velocity[3]);
+/* What the fluid gave to the body in the last frame, kg m/s. */
+void cell_body_impulse(const cell *c, const simulation *s, double impulse[3]);
+/* Adds fluid at rows of three numbers behind what there is, to the world as well. */
+bool cell_add_fluid(cell *c, simulation *s, size_t count, const double *position,
+                    const double *velocity);
 /* One frame. False: the cell has failed (a step that fails, a number that is not finite), has run all
  * its frames, or is out of time. */
 bool cell_step(cell *c, simulation *s);
@@ -64,8 +74,11 @@ ascc_measure_motion_sums cell_motion(const simulation *s);
 bool cell_nothing_escapes(cell *c, const simulation *s);
 /* At most one in 1,000 pairs nearer than a fifth of the spacing. */
 bool cell_nothing_clumps(cell *c, const simulation *s);
-/* Mean density of the fluid by the poly6 window, of rest density. */
+/* The distance of the nearest pair, m. */
+double cell_nearest_pair(const simulation *s);
+/* Mean density of the fluid by the poly6 window, of rest density: of all, or of what is between two corners. */
 double cell_density(const simulation *s);
+double cell_density_between(const simulation *s, const double low[3], const double high[3]);
 bool cell_slower_than(cell *c, const simulation *s, double speed);
 
 #endif

@@ -2,7 +2,8 @@
  * SPDX-License-Identifier: MIT
  *
  *   stability [--quick] [--shared DIR] [--docs DIR] [--scenes 'A;B'] [--methods 'A;B']
- *             [--model FILE]... [--frames N] [--minutes M] [--budget SECONDS] [--jobs N]
+ *             [--model FILE]... [--dimension 2] [--frames N] [--minutes M] [--budget SECONDS]
+ *             [--jobs N]
  *
  * The whole may take M minutes on idle cores. A cell may use four times its part of the time that is left,
  * since most end early, the last ones a third of it. Scenes of few frames come first, so the long ones get
@@ -23,7 +24,7 @@
 #include "evaluate.h"
 #include "suite.h"
 
-/* Name, method; @ is the folder of shared data. */
+/* Name, method; @ is the folder of shared data, whose models are in 3D. */
 static const char *const methods[][2] = {
     {"DMCF", "@/data/weights/dmcf-liquid3d.safetensors"},
     {"CConv", "@/data/weights/cconv-liquid3d.safetensors"},
@@ -40,6 +41,7 @@ enum { METHODS = sizeof methods / sizeof *methods, MOST_METHODS = 32, MOST_SCENE
 typedef struct suite {
     const char *shared, *docs, *only_scenes, *only_methods;
     bool quick;
+    int dimension;
     long frames;
     double minutes; /* of all processes together, idle cores */
     double budget;  /* CPU seconds of every cell instead, or 0 */
@@ -111,7 +113,7 @@ static void choose_methods(suite *s)
         const bool shared = methods[m][1][0] == '@';
         char path[512];
         snprintf(path, sizeof path, "%s%s", s->shared, methods[m][1] + 1);
-        if (!listed(s->only_methods, methods[m][0]))
+        if (!listed(s->only_methods, methods[m][0]) || (shared && s->dimension == 2))
             continue;
         if (shared && access(path, R_OK) != 0)
             fprintf(stderr, "stability: %s: no %s, left out\n", methods[m][0], path);
@@ -121,7 +123,9 @@ static void choose_methods(suite *s)
     /* The project's own models, as the chart has them; kept until the end. */
     static glob_t own;
     if (!s->only_methods && !s->model_count &&
-        glob("examples/models/*3d*.safetensors", 0, NULL, &own) == 0)
+        glob(s->dimension == 2 ? "examples/models/*2d*.safetensors"
+                               : "examples/models/*3d*.safetensors",
+             0, NULL, &own) == 0)
         while (s->model_count < own.gl_pathc && s->model_count < MOST_METHODS)
             add_model(s, own.gl_pathv[s->model_count]);
     for (size_t k = 0; k < s->model_count; k++) {
@@ -147,7 +151,8 @@ static double share(const suite *s, const board *b)
 static void run_cell(const suite *s, board *b, size_t i, size_t j)
 {
     cell *c = &b->cells[i][j];
-    *c = (cell){.frames = frames_of(s, s->scene[i]),
+    *c = (cell){.dimension = s->dimension,
+                .frames = frames_of(s, s->scene[i]),
                 .budget = share(s, b),
                 .start = (double)clock() / CLOCKS_PER_SEC};
     c->method = ascc_method_find(s->words[j], &c->settings);
@@ -205,6 +210,12 @@ static bool run_all(const suite *s, board *b)
 
 /* ---- Documents ------------------------------------------------------------------------------- */
 
+/* Between these is what a run writes. */
+static const char *const marks[2][2] = {
+    {"<!-- matrix begins -->", "<!-- matrix ends -->"},
+    {"<!-- flat matrix begins -->", "<!-- flat matrix ends -->"},
+};
+
 static void cpu_name(char *name, size_t capacity)
 {
     char line[256];
@@ -247,11 +258,12 @@ static void write_markdown(FILE *f, const suite *s, const board *b)
     (void)getloadavg(load, 3);
     (void)strftime(date, sizeof date, "%Y-%m-%d", gmtime(&now));
     cpu_name(cpu, sizeof cpu);
-    fprintf(f,
-            "<!-- matrix begins -->\n%s run of %s, %s, %d process%s of one thread, load %.1f: %.1f "
-            "minutes of CPU time, of ",
-            s->quick ? "The quick" : "The full", date, cpu, s->jobs, s->jobs > 1 ? "es" : "",
-            load[0], 1e-6 / 60.0 * (double)atomic_load(&b->spent));
+    fprintf(
+        f,
+        "%s\n%s run in %dD of %s, %s, %d process%s of one thread, load %.1f: %.1f minutes of CPU "
+        "time, of ",
+        marks[s->dimension == 2][0], s->quick ? "The quick" : "The full", s->dimension, date, cpu,
+        s->jobs, s->jobs > 1 ? "es" : "", load[0], 1e-6 / 60.0 * (double)atomic_load(&b->spent));
     if (s->budget > 0.0)
         fprintf(f, "%.0f s for each cell.\n\n", s->budget);
     else
@@ -266,7 +278,7 @@ static void write_markdown(FILE *f, const suite *s, const board *b)
         const char *slash = strrchr(s->words[j], '/');
         fprintf(f, "| %s | `%s` |\n", s->method[j], slash ? slash + 1 : s->words[j]);
     }
-    fputs("<!-- matrix ends -->\n", f);
+    fprintf(f, "%s\n", marks[s->dimension == 2][1]);
 }
 
 /* The text of an SVG element, without what XML minds. */
@@ -336,14 +348,14 @@ static void write_svg(FILE *f, const suite *s, const board *b)
 static bool write_documents(const suite *s, const board *b)
 {
     char path[600];
-    static char old[65536];
+    static char old[1 << 20];
     snprintf(path, sizeof path, "%s/stability.md", s->docs);
     FILE *f = fopen(path, "r");
     old[f ? fread(old, 1, sizeof old - 1, f) : 0] = 0;
     if (f)
         fclose(f);
-    char *begin = strstr(old, "<!-- matrix begins -->"),
-         *end = strstr(old, "<!-- matrix ends -->\n");
+    const char *const *mark = marks[s->dimension == 2];
+    char *begin = strstr(old, mark[0]), *end = strstr(old, mark[1]);
     f = fopen(path, "w");
     if (!f)
         return false;
@@ -351,9 +363,10 @@ static bool write_documents(const suite *s, const board *b)
         fwrite(old, 1, (size_t)(begin - old), f);
     write_markdown(f, s, b);
     if (begin && end)
-        fputs(end + strlen("<!-- matrix ends -->\n"), f);
+        fputs(end + strlen(mark[1]) + 1, f);
     bool good = fclose(f) == 0;
-    snprintf(path, sizeof path, "%s/figures/stability.svg", s->docs);
+    snprintf(path, sizeof path, "%s/figures/stability%s.svg", s->docs,
+             s->dimension == 2 ? "2d" : "");
     f = fopen(path, "w");
     if (!f)
         return false;
@@ -375,6 +388,8 @@ static bool read_option(suite *s, const char *name, const char *value)
         s->only_methods = value;
     else if (strcmp(name, "--model") == 0 && s->model_count < MOST_METHODS)
         add_model(s, value);
+    else if (strcmp(name, "--dimension") == 0)
+        return (s->dimension = (int)strtol(value, NULL, 10)) == 2 || s->dimension == 3;
     else if (strcmp(name, "--frames") == 0)
         return (s->frames = strtol(value, NULL, 10)) > 0;
     else if (strcmp(name, "--minutes") == 0)
@@ -390,7 +405,7 @@ static bool read_option(suite *s, const char *name, const char *value)
 
 int main(int argc, char **argv)
 {
-    static suite s = {.shared = "../shared"};
+    static suite s = {.shared = "../shared", .dimension = 3};
     s.jobs = (int)sysconf(_SC_NPROCESSORS_ONLN);
     for (int i = 1; i < argc; i++) {
         if (strcmp(argv[i], "--quick") == 0) {
@@ -398,11 +413,11 @@ int main(int argc, char **argv)
             continue;
         }
         if (i + 1 == argc || !read_option(&s, argv[i], argv[i + 1])) {
-            fputs(
-                "usage: stability [--quick] [--shared DIR] [--docs DIR] [--scenes 'A;B']\n"
-                "                 [--methods 'A;B'] [--model FILE]... [--frames N] [--minutes M]\n"
-                "                 [--budget SECONDS] [--jobs N]\n",
-                stderr);
+            fputs("usage: stability [--quick] [--shared DIR] [--docs DIR] [--scenes 'A;B']\n"
+                  "                 [--methods 'A;B'] [--model FILE]... [--dimension 2] [--frames "
+                  "N]\n"
+                  "                 [--minutes M] [--budget SECONDS] [--jobs N]\n",
+                  stderr);
             return 2;
         }
         i++;

@@ -4,6 +4,11 @@
 
 #include "cell.h"
 
+#define SPACING 0.05 /* m, what the published networks were trained with */
+#define G 9.81
+/* What a fall through a box of 16 spacings ends with. */
+#define FALL sqrt(2.0 * G * 16 * SPACING)
+
 typedef struct stability_scene {
     const char *name;
     const char *line; /* what passes */
@@ -13,5 +18,15 @@ typedef struct stability_scene {
 
 /** NULL name at the end. A scene more is a function and a line in its table: docs/stability.md. */
 extern const stability_scene stability_scenes[];
+
+/* Those of moving.c. */
+void stability_light_body(cell *c);
+void stability_heavy_body(cell *c);
+void stability_held_box(cell *c);
+void stability_thin_cup(cell *c);
+void stability_narrow_slab(cell *c);
+void stability_paddle(cell *c);
+void stability_turned_tank(cell *c);
+void stability_tap(cell *c);
 
 #endif

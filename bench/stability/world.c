@@ -2,6 +2,7 @@
 #include "world.h"
 
 #include <math.h>
+#include <stdbool.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -27,13 +28,13 @@ static void refer(world *w)
     w->scene.first_layer = w->scene.wall_count;
 }
 
-world world_empty(double spacing)
+world world_empty(int dimension, double spacing)
 {
-    world w = {.scene = {.dimension = 3,
+    world w = {.scene = {.dimension = dimension,
                          .threads = 1,
                          .time_step = 0.02,
                          .spacing = spacing,
-                         .mass = 1000.0 * spacing * spacing * spacing,
+                         .mass = 1000.0 * pow(spacing, dimension),
                          .rest_density = 1000.0,
                          .gravity = {0.0, -9.81, 0.0}}};
     w.position = more(NULL, 0);
@@ -52,13 +53,25 @@ void world_free(world *w)
     free(w->normal);
 }
 
+static bool is_flat(const world *w)
+{
+    return w->scene.dimension == 2;
+}
+
+/* A flat world has nothing along z. */
+static void put_row(const world *w, double *row, const double from[3])
+{
+    memcpy(row, from, 3 * sizeof *row);
+    row[2] = is_flat(w) ? 0.0 : row[2];
+}
+
 void world_add(world *w, const double position[3], const double velocity[3])
 {
     const size_t n = w->scene.fluid_count++;
     w->position = more(w->position, n + 1);
     w->velocity = more(w->velocity, n + 1);
-    memcpy(w->position + 3 * n, position, 3 * sizeof(double));
-    memcpy(w->velocity + 3 * n, velocity, 3 * sizeof(double));
+    put_row(w, w->position + 3 * n, position);
+    put_row(w, w->velocity + 3 * n, velocity);
 }
 
 static void add_wall(world *w, const double position[3], const double normal[3])
@@ -66,32 +79,49 @@ static void add_wall(world *w, const double position[3], const double normal[3])
     const size_t n = w->scene.wall_count++;
     w->wall = more(w->wall, n + 1);
     w->normal = more(w->normal, n + 1);
-    memcpy(w->wall + 3 * n, position, 3 * sizeof(double));
-    memcpy(w->normal + 3 * n, normal, 3 * sizeof(double));
+    put_row(w, w->wall + 3 * n, position);
+    put_row(w, w->normal + 3 * n, normal);
     refer(w);
+}
+
+/* Points a length is cut into; one across a flat world. */
+static int points_along(const world *w, int axis, double length)
+{
+    return is_flat(w) && axis == 2 ? 1 : (int)ceil(length / WALL_SPACING);
+}
+
+/* A rectangle from low to high, spacings, its normal along the axis, with this sign. */
+static void add_rectangle(world *w, int axis, const double low[3], const double high[3],
+                          double sign)
+{
+    const double s = w->scene.spacing;
+    const int p = (axis + 1) % 3, q = (axis + 2) % 3;
+    const double width = high[p] - low[p], height = high[q] - low[q];
+    const int m = points_along(w, p, width), n = points_along(w, q, height);
+    for (int j = 0; j < m && !(is_flat(w) && axis == 2); j++)
+        for (int k = 0; k < n; k++) {
+            double x[3], normal[3] = {0.0, 0.0, 0.0};
+            x[axis] = low[axis] * s;
+            x[p] = (low[p] + (j + 0.5) * width / m) * s;
+            x[q] = (low[q] + (k + 0.5) * height / n) * s;
+            normal[axis] = sign;
+            add_wall(w, x, normal);
+        }
 }
 
 /* Both sides of the box across an axis. */
 static void add_sides(world *w, const double edges[3], int axis)
 {
-    const int p = (axis + 1) % 3, q = (axis + 2) % 3;
-    const int m = (int)ceil(edges[p] / WALL_SPACING), n = (int)ceil(edges[q] / WALL_SPACING);
-    for (int side = 0; side < 2; side++)
-        for (int j = 0; j < m; j++)
-            for (int k = 0; k < n; k++) {
-                double x[3], normal[3] = {0.0, 0.0, 0.0};
-                x[axis] = side * edges[axis] * w->scene.spacing;
-                x[p] = (j + 0.5) * edges[p] * w->scene.spacing / m;
-                x[q] = (k + 0.5) * edges[q] * w->scene.spacing / n;
-                normal[axis] = side ? -1.0 : 1.0;
-                add_wall(w, x, normal);
-            }
+    double low[3] = {0.0, 0.0, 0.0};
+    add_rectangle(w, axis, low, edges, 1.0);
+    low[axis] = edges[axis];
+    add_rectangle(w, axis, low, edges, -1.0);
 }
 
-void world_box(world *w, const int edges[3])
+void world_box(world *w, const double edges[3])
 {
     for (int axis = 0; axis < 3; axis++)
-        add_sides(w, (double[]){edges[0], edges[1], edges[2]}, axis);
+        add_sides(w, edges, axis);
 }
 
 void world_tube(world *w, const double edges[3])
@@ -103,7 +133,7 @@ void world_tube(world *w, const double edges[3])
 void world_wedge(world *w, double middle, double half, double height, double depth)
 {
     const double s = w->scene.spacing, slope = hypot(half, height);
-    const int m = (int)ceil(slope / WALL_SPACING), n = (int)ceil(depth / WALL_SPACING);
+    const int m = points_along(w, 0, slope), n = points_along(w, 2, depth);
     for (int side = -1; side <= 1; side += 2)
         for (int j = 0; j < m; j++)
             for (int k = 0; k < n; k++) {
@@ -114,13 +144,17 @@ void world_wedge(world *w, double middle, double half, double height, double dep
             }
 }
 
-static void take_out(world *w, const double center[3], double half)
+/* Fluid within a box, spacings. */
+static void take_out(world *w, const double low[3], const double high[3])
 {
+    const double s = w->scene.spacing;
     size_t kept = 0;
     for (size_t i = 0; i < w->scene.fluid_count; i++) {
         const double *x = w->position + 3 * i;
-        if (fabs(x[0] - center[0]) < half && fabs(x[1] - center[1]) < half &&
-            fabs(x[2] - center[2]) < half)
+        bool in = true;
+        for (int c = 0; c < w->scene.dimension; c++)
+            in = in && x[c] > low[c] * s && x[c] < high[c] * s;
+        if (in)
             continue;
         memmove(w->position + 3 * kept, x, 3 * sizeof(double));
         memmove(w->velocity + 3 * kept, w->velocity + 3 * i, 3 * sizeof(double));
@@ -129,24 +163,91 @@ static void take_out(world *w, const double center[3], double half)
     w->scene.fluid_count = kept;
 }
 
-void world_body(world *w, const double center[3], double edge)
+#define CLEAR 0.99 /* spacings, around new walls */
+
+static void add_plate(world *w, int axis, const double low[3], const double high[3])
 {
-    const double s = w->scene.spacing;
-    const int m = (int)ceil(edge / WALL_SPACING);
+    add_rectangle(w, axis, low, high, 1.0);
+    add_rectangle(w, axis, low, high, -1.0);
+}
+
+void world_cup(world *w, const double low[3], const double high[3])
+{
+    for (int axis = 0; axis < 3; axis++) {
+        double from[3] = {low[0], low[1], low[2]};
+        add_plate(w, axis, from, high);
+        from[axis] = high[axis];
+        if (axis != 1)
+            add_plate(w, axis, from, high);
+    }
+    take_out(w, (double[]){low[0] - CLEAR, low[1] - CLEAR, low[2] - CLEAR},
+             (double[]){high[0] + CLEAR, high[1], high[2] + CLEAR});
+}
+
+void world_body(world *w, const double center[3], double edge, double inset)
+{
+    const double s = w->scene.spacing, half = 0.5 * edge - inset;
     const size_t walls = w->scene.wall_count;
-    for (int axis = 0; axis < 3; axis++)
-        for (int side = -1; side <= 1; side += 2)
-            for (int j = 0; j < m; j++)
-                for (int k = 0; k < m; k++) {
-                    double x[3], normal[3] = {0.0, 0.0, 0.0};
-                    x[axis] = center[axis] + 0.5 * side * edge * s;
-                    x[(axis + 1) % 3] = center[(axis + 1) % 3] + ((j + 0.5) / m - 0.5) * edge * s;
-                    x[(axis + 2) % 3] = center[(axis + 2) % 3] + ((k + 0.5) / m - 0.5) * edge * s;
-                    normal[axis] = side;
-                    add_wall(w, x, normal);
-                }
+    double low[3], high[3];
+    for (int c = 0; c < 3; c++) {
+        low[c] = center[c] / s - half;
+        high[c] = center[c] / s + half;
+    }
+    for (int axis = 0; axis < 3; axis++) {
+        double from[3] = {low[0], low[1], low[2]};
+        add_rectangle(w, axis, from, high, -1.0);
+        from[axis] = high[axis];
+        add_rectangle(w, axis, from, high, 1.0);
+    }
     w->scene.body_count = w->scene.wall_count - walls;
-    take_out(w, center, (0.5 * edge + 0.99) * s);
+    put_row(w, w->scene.body_center, center);
+    take_out(w, (double[]){low[0] - CLEAR, low[1] - CLEAR, low[2] - CLEAR},
+             (double[]){high[0] + CLEAR, high[1] + CLEAR, high[2] + CLEAR});
+}
+
+void world_paddle(world *w, double x, const double low[3], const double high[3])
+{
+    const size_t walls = w->scene.wall_count;
+    add_rectangle(w, 0, (const double[]){x, low[1], low[2]}, (const double[]){x, high[1], high[2]},
+                  1.0);
+    w->scene.body_count = w->scene.wall_count - walls;
+}
+
+void world_all_moves(world *w, const double center[3])
+{
+    w->scene.body_count = w->scene.wall_count;
+    put_row(w, w->scene.body_center, center);
+}
+
+/* Turned about an axis of length 1 (Rodrigues). */
+static void turn_row(double row[3], const double axis[3], double angle)
+{
+    const double x[3] = {row[0], row[1], row[2]};
+    const double along = axis[0] * x[0] + axis[1] * x[1] + axis[2] * x[2];
+    for (int c = 0; c < 3; c++) {
+        const int p = (c + 1) % 3, q = (c + 2) % 3;
+        row[c] = cos(angle) * x[c] + sin(angle) * (axis[p] * x[q] - axis[q] * x[p]) +
+                 (1.0 - cos(angle)) * along * axis[c];
+    }
+}
+
+void world_move_body(world *w, const double velocity[3], const double spin[3], double dt)
+{
+    double axis[3], *center = w->scene.body_center;
+    const double rate = sqrt(spin[0] * spin[0] + spin[1] * spin[1] + spin[2] * spin[2]);
+    for (int c = 0; c < 3; c++)
+        axis[c] = rate > 0.0 ? spin[c] / rate : 0.0;
+    for (size_t i = w->scene.wall_count - w->scene.body_count; i < w->scene.wall_count; i++) {
+        double *x = w->wall + 3 * i;
+        for (int c = 0; c < 3; c++)
+            x[c] -= center[c];
+        turn_row(x, axis, rate * dt);
+        turn_row(w->normal + 3 * i, axis, rate * dt);
+        for (int c = 0; c < 3; c++)
+            x[c] += center[c] + dt * velocity[c];
+    }
+    for (int c = 0; c < 3; c++)
+        center[c] += dt * velocity[c];
 }
 
 static double *duplicate(const double *array, size_t rows)
@@ -170,7 +271,8 @@ world world_copy(const world *w)
 void world_block(world *w, const double low[3], const int cells[3], const double velocity[3])
 {
     const double s = w->scene.spacing;
-    for (int k = 0; k < cells[2]; k++)
+    const int deep = is_flat(w) ? 1 : cells[2];
+    for (int k = 0; k < deep; k++)
         for (int j = 0; j < cells[1]; j++)
             for (int i = 0; i < cells[0]; i++)
                 world_add(w,
@@ -179,11 +281,20 @@ void world_block(world *w, const double low[3], const int cells[3], const double
                           velocity);
 }
 
+world world_tank(int dimension, double spacing, const int cells[3], const double edges[3])
+{
+    const double corner[3] = {0.5 * spacing, 0.5 * spacing, 0.5 * spacing};
+    world w = world_empty(dimension, spacing);
+    world_box(&w, edges);
+    world_block(&w, corner, cells, (const double[]){0.0, 0.0, 0.0});
+    return w;
+}
+
 void world_ball(world *w, double radius)
 {
     const double s = w->scene.spacing;
-    const int n = (int)ceil(radius / s);
-    for (int k = -n; k <= n; k++)
+    const int n = (int)ceil(radius / s), deep = is_flat(w) ? 0 : n;
+    for (int k = -deep; k <= deep; k++)
         for (int j = -n; j <= n; j++)
             for (int i = -n; i <= n; i++)
                 if ((i * i + j * j + k * k) * s * s <= radius * radius)
@@ -194,7 +305,7 @@ void world_sheet(world *w, double half)
 {
     const double step = WALL_SPACING * w->scene.spacing;
     for (double y = -half; y <= half; y += step)
-        for (double z = -half; z <= half; z += step)
+        for (double z = -half; z <= half && (z == -half || !is_flat(w)); z += step)
             add_wall(w, (double[]){0.0, y, z}, (double[]){1.0, 0.0, 0.0});
 }
 
@@ -212,6 +323,13 @@ void world_turn_back(double row[3])
     row[2] = row[1];
     row[1] = row[0];
     row[0] = z;
+}
+
+void world_swap(double row[3])
+{
+    const double x = row[0];
+    row[0] = row[1];
+    row[1] = x;
 }
 
 void world_flip(double row[3])

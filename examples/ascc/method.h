@@ -30,6 +30,7 @@ typedef struct ascc_method_scene {
     const double *wall, *normal; /* [wall_count][dimension] */
     size_t first_layer;          /* wall points that touch the fluid: the first so many */
     size_t body_count;           /* wall points of a body that moves: the last so many */
+    double body_center[3];       /* what it turns about, and takes along */
 } ascc_method_scene;
 
 /** Why a method failed. */
@@ -53,10 +54,14 @@ typedef struct ascc_method {
     /* Momentum that gravity gave to the fluid and that the fluid gave to walls in the last frame, kg
      * m/s; NULL if the method cannot tell. */
     void (*impulses)(const void *state, double external[3], double wall[3]);
-    /* Moves the scene's body before the next frame, and tells what the fluid gave to it in the last one,
-     * kg m/s; NULL if the method has no such bodies. */
-    bool (*move_body)(void *state, const double by[3], ascc_method_error *error);
+    /* How the scene's body moves in the next frame, m/s and 1/s; it then stands still until the next call. And
+     * what the fluid gave to it in the last frame, kg m/s. Both NULL if the method has no such bodies. */
+    bool (*drive_body)(void *state, const double velocity[3], const double spin[3],
+                       ascc_method_error *error);
     void (*body_impulse)(const void *state, double impulse[3]);
+    /* Adds fluid behind what there is; the caller then raises the scene's count. NULL if the method cannot. */
+    bool (*add_fluid)(void *state, size_t count, const double *position, const double *velocity,
+                      ascc_method_error *error);
     void (*close)(void *state);
 } ascc_method;
 

@@ -66,7 +66,8 @@ static bool place_walls(method_dfsph *m)
 {
     const ascc_method_scene *scene = m->scene;
     const size_t still = scene->wall_count - scene->body_count;
-    const rigid body = {.kind = RIGID_DRIVEN};
+    rigid body = {.kind = RIGID_DRIVEN};
+    memcpy(body.center, scene->body_center, sizeof body.center);
     return dfsph_set_walls(m->solver, still, scene->wall) == ASCC_OK &&
            (scene->body_count == 0 ||
             dfsph_add_body(m->solver, scene->body_count,
@@ -164,22 +165,45 @@ static void method_dfsph_impulses(const void *state, double external[3], double 
     }
 }
 
-/* The body goes there in the course of the frame. */
-static bool method_dfsph_move_body(void *state, const double by[3], ascc_method_error *error)
+static bool method_dfsph_drive_body(void *state, const double velocity[3], const double spin[3],
+                                    ascc_method_error *error)
 {
     const method_dfsph *m = state;
-    const double still[3] = {0};
-    double velocity[3];
     (void)error;
-    for (int c = 0; c < 3; c++)
-        velocity[c] = by[c] / m->scene->time_step;
-    dfsph_drive_body(m->solver, 0, velocity, still);
+    dfsph_drive_body(m->solver, 0, velocity, spin);
     return true;
 }
 
 static void method_dfsph_body_impulse(const void *state, double impulse[3])
 {
     memcpy(impulse, ((const method_dfsph *)state)->body_last, 3 * sizeof *impulse);
+}
+
+/* All fluid anew, which begins without a pressure to start from. */
+static bool method_dfsph_add_fluid(void *state, size_t count, const double *position,
+                                   const double *velocity, ascc_method_error *error)
+{
+    method_dfsph *m = state;
+    const size_t d = (size_t)m->scene->dimension, before = m->scene->fluid_count;
+    const size_t all = before + count;
+    double *x = malloc((all * d + 1) * sizeof *x), *v = malloc((all * d + 1) * sizeof *v);
+    bool good = x && v;
+    snprintf(error->text, sizeof error->text, "no memory for %zu particles", all);
+    if (good) {
+        method_dfsph_read(m, x, v);
+        memcpy(x + before * d, position, count * d * sizeof *x);
+        memcpy(v + before * d, velocity, count * d * sizeof *v);
+        good = dfsph_set_fluid(m->solver, all, x, v) == ASCC_OK;
+        memset(m->wall_before, 0, sizeof m->wall_before);
+    }
+    free(x);
+    if (!good) {
+        free(v);
+        return false;
+    }
+    free(m->velocity); /* as large as what may be set */
+    m->velocity = v;
+    return true;
 }
 
 const ascc_method ascc_method_dfsph = {
@@ -191,7 +215,8 @@ const ascc_method ascc_method_dfsph = {
     .advance = method_dfsph_advance,
     .read = method_dfsph_read,
     .impulses = method_dfsph_impulses,
-    .move_body = method_dfsph_move_body,
+    .drive_body = method_dfsph_drive_body,
     .body_impulse = method_dfsph_body_impulse,
+    .add_fluid = method_dfsph_add_fluid,
     .close = method_dfsph_close,
 };

@@ -3,6 +3,7 @@
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 
 #include <ascc/ascc.h>
 
@@ -16,6 +17,8 @@ typedef struct learned {
     ascc_step *step;
     ascc_particles *particles;
     double time_step; /* of the model */
+    int32_t body;     /* of the scene's body, which has a frame of its own */
+    bool driven;      /* for the next frame */
 } learned;
 
 static bool context_failed(const learned *m, const char *what, ascc_method_error *error)
@@ -77,16 +80,38 @@ static bool learned_open(const char *settings, const ascc_method_scene *scene, v
     return true;
 }
 
-enum { WALLS = 0, BODY = 1 };
+enum { WALLS = 0 };
 
-static ascc_status add_walls(learned *m, size_t first, size_t end, int32_t body)
+static ascc_status add_walls(learned *m, size_t count)
 {
-    const size_t d = (size_t)m->scene->dimension;
-    const ascc_const_array wall = {.data = m->scene->wall + first * d, .scalar = ASCC_DOUBLE};
-    const ascc_const_array normal = {.data = m->scene->normal + first * d, .scalar = ASCC_DOUBLE};
-    if (first == end)
-        return ASCC_OK;
-    return ascc_particles_add_boundary(m->particles, end - first, &wall, &normal, body, NULL);
+    const ascc_const_array wall = {.data = m->scene->wall, .scalar = ASCC_DOUBLE};
+    const ascc_const_array normal = {.data = m->scene->normal, .scalar = ASCC_DOUBLE};
+    return count ? ascc_particles_add_boundary(m->particles, count, &wall, &normal, WALLS, NULL)
+                 : ASCC_OK;
+}
+
+/* The scene's last wall points, about its centre. */
+static ascc_status add_body(learned *m, size_t first)
+{
+    const ascc_method_scene *scene = m->scene;
+    const size_t d = (size_t)scene->dimension, count = scene->wall_count - first;
+    double *own = malloc((count * d + 1) * sizeof *own);
+    if (!own)
+        return ASCC_ERROR_MEMORY;
+    for (size_t k = 0; k < count * d; k++)
+        own[k] = scene->wall[first * d + k] - scene->body_center[k % d];
+    const ascc_const_array position = {.data = own, .scalar = ASCC_DOUBLE};
+    const ascc_const_array normal = {.data = scene->normal + first * d, .scalar = ASCC_DOUBLE};
+    const ascc_shape shape = {.size = sizeof shape,
+                              .kind = ASCC_SHAPE_POINTS,
+                              .count = count,
+                              .position = &position,
+                              .normal = &normal};
+    ascc_pose pose = {.size = sizeof pose};
+    memcpy(pose.position, scene->body_center, d * sizeof *pose.position);
+    const ascc_status status = ascc_body_add(m->particles, &shape, &pose, &m->body);
+    free(own);
+    return status;
 }
 
 static ascc_status learned_fill(learned *m, const double *position, const double *velocity)
@@ -97,9 +122,9 @@ static ascc_status learned_fill(learned *m, const double *position, const double
     ascc_status status =
         ascc_particles_add_fluid(m->particles, m->scene->fluid_count, &x, &v, NULL, NULL);
     if (status == ASCC_OK)
-        status = add_walls(m, 0, body, WALLS);
-    if (status == ASCC_OK)
-        status = add_walls(m, body, m->scene->wall_count, BODY);
+        status = add_walls(m, body);
+    if (status == ASCC_OK && m->scene->body_count)
+        status = add_body(m, body);
     return status;
 }
 
@@ -116,6 +141,7 @@ static bool learned_set(void *state, const double *position, const double *veloc
     const ascc_step_options step = {.size = sizeof step,
                                     .time_step = fabs(dt - m->time_step) > 1e-6 * dt ? dt : 0.0};
     (void)kind;
+    m->driven = false;
     ascc_particles_destroy(&m->particles);
     if (!m->step && ascc_step_create(m->context, m->model, &step, &m->step) != ASCC_OK)
         return context_failed(m, "step", error);
@@ -127,14 +153,39 @@ static bool learned_set(void *state, const double *position, const double *veloc
     return false;
 }
 
+static bool move_body(learned *m, const double velocity[3], const double spin[3],
+                      ascc_method_error *error)
+{
+    ascc_body_info now = {.size = sizeof now};
+    ascc_pose pose = {.size = sizeof pose};
+    const size_t d = (size_t)m->scene->dimension;
+    ascc_status status = ascc_body_get(m->particles, m->body, &now);
+    memcpy(pose.position, now.position, sizeof pose.position);
+    memcpy(pose.rotation, now.rotation, sizeof pose.rotation);
+    pose.angle = now.angle;
+    if (d == 2)
+        memset(pose.rotation, 0, sizeof pose.rotation);
+    memcpy(pose.velocity, velocity, d * sizeof *pose.velocity);
+    memcpy(pose.spin, spin, sizeof pose.spin);
+    if (status == ASCC_OK)
+        status = ascc_body_move(m->particles, m->body, &pose);
+    if (status != ASCC_OK)
+        snprintf(error->text, sizeof error->text, "%s", ascc_particles_message(m->particles));
+    return status == ASCC_OK;
+}
+
 static bool learned_advance(void *state, ascc_method_error *error)
 {
     learned *m = state;
+    const double still[3] = {0.0, 0.0, 0.0};
     const ascc_forces forces = {.size = sizeof forces, .gravity = m->scene->gravity};
-    if (ascc_step_run(m->step, m->particles, &forces, 1) == ASCC_OK)
-        return true;
-    snprintf(error->text, sizeof error->text, "%s", ascc_step_message(m->step));
-    return false;
+    if (ascc_step_run(m->step, m->particles, &forces, 1) != ASCC_OK) {
+        snprintf(error->text, sizeof error->text, "%s", ascc_step_message(m->step));
+        return false;
+    }
+    const bool stops = m->driven;
+    m->driven = false;
+    return !stops || move_body(m, still, still, error);
 }
 
 static void learned_read(const void *state, double *position, double *velocity)
@@ -158,34 +209,34 @@ static void learned_impulses(const void *state, double external[3], double wall[
     }
 }
 
-/* Point by point: bodies of a few hundred points. */
-static bool learned_move_body(void *state, const double by[3], ascc_method_error *error)
+static bool learned_drive_body(void *state, const double velocity[3], const double spin[3],
+                               ascc_method_error *error)
 {
     learned *m = state;
-    for (size_t i = m->scene->wall_count - m->scene->body_count; i < m->scene->wall_count; i++) {
-        double x[3];
-        const ascc_array read = {.data = x, .scalar = ASCC_DOUBLE};
-        const ascc_const_array moved = {.data = x, .scalar = ASCC_DOUBLE};
-        (void)ascc_particles_get(m->particles, ASCC_BOUNDARY, ASCC_POSITION, i, 1, &read);
-        for (int c = 0; c < m->scene->dimension; c++)
-            x[c] += by[c];
-        if (ascc_particles_set(m->particles, ASCC_BOUNDARY, ASCC_POSITION, i, 1, &moved) !=
-            ASCC_OK) {
-            snprintf(error->text, sizeof error->text, "%s", ascc_particles_message(m->particles));
-            return false;
-        }
-    }
-    return true;
+    m->driven = true;
+    return move_body(m, velocity, spin, error);
 }
 
 static void learned_body_impulse(const void *state, double impulse[3])
 {
     const learned *m = state;
     const double quantum = ascc_particles_momentum_quantum(m->particles);
-    int64_t quanta[3] = {0};
-    (void)ascc_particles_body_impulse(m->particles, BODY, NULL, quanta, NULL);
+    int64_t quanta[1][3] = {{0}};
+    (void)ascc_bodies_impulse(m->particles, 1, &m->body, quanta, NULL);
     for (int c = 0; c < 3; c++)
-        impulse[c] = (double)quanta[c] * quantum;
+        impulse[c] = (double)quanta[0][c] * quantum;
+}
+
+static bool learned_add_fluid(void *state, size_t count, const double *position,
+                              const double *velocity, ascc_method_error *error)
+{
+    learned *m = state;
+    const ascc_const_array x = {.data = position, .scalar = ASCC_DOUBLE};
+    const ascc_const_array v = {.data = velocity, .scalar = ASCC_DOUBLE};
+    if (ascc_particles_add_fluid(m->particles, count, &x, &v, NULL, NULL) == ASCC_OK)
+        return true;
+    snprintf(error->text, sizeof error->text, "%s", ascc_particles_message(m->particles));
+    return false;
 }
 
 const ascc_method ascc_method_model = {
@@ -197,7 +248,8 @@ const ascc_method ascc_method_model = {
     .advance = learned_advance,
     .read = learned_read,
     .impulses = learned_impulses,
-    .move_body = learned_move_body,
+    .drive_body = learned_drive_body,
     .body_impulse = learned_body_impulse,
+    .add_fluid = learned_add_fluid,
     .close = learned_close,
 };
