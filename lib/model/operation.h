@@ -110,6 +110,8 @@ typedef struct ascc_operation {
     size_t (*columns)(const struct ascc_tile *tile, const ascc_term *term);
     /* Of one whose columns are gathered from neighbours (network/column.h), else NULL. */
     const struct ascc_column_functions *around;
+    /* Its way back leads to places alone, nowhere where these are constants. */
+    bool leads_to_places;
     /* From the gradient of a tile to those of tensors, source and places. */
     void (*backward)(const struct ascc_reverse *pass, const ascc_layer *layer,
                      const ascc_term *term, const uint32_t *list, size_t n);

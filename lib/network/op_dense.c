@@ -121,7 +121,8 @@ static void backward(const ascc_reverse *pass, const ascc_layer *layer, const as
     const size_t a = ascc_padded(term->inputs), b = ascc_padded(term->outputs);
     const float *source = ascc_term_source(run, term);
     float *gradient = ascc_reverse_source(pass, term);
-    ascc_matrix_back(pass, term, n);
+    if (gradient)
+        ascc_matrix_back(pass, term, n);
     for (size_t r = 0, j; r < n; r++) {
         if (ascc_network_shared_row(run->hierarchy, layer->set, set, list[r], &j)) {
             for (size_t c = 0; gradient && c < a; c++)

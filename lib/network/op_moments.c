@@ -286,4 +286,5 @@ const ascc_operation ascc_op_moments = {.name = "pair moments",
                                         .scratch = scratch,
                                         .reads_features = always,
                                         .forward = forward,
+                                        .leads_to_places = true,
                                         .backward = backward};

@@ -9,6 +9,7 @@
 #include <string.h>
 
 #include "column.h"
+#include "line_reverse.h"
 #include "model/cost.h"
 #include "model/filter.h"
 #include "model/initial.h"
@@ -304,7 +305,7 @@ static ascc_lines lines_of(const coefficients *c, int side)
                     .both = side == FLUID,
                     .coefficient = c->side[side],
                     .place = side == FLUID ? c->place : NULL,
-                    .factor = c->scale->factor[0],
+                    .factor = c->scale ? c->scale->factor[0] : 0.0, /* of impulses alone */
                     .limit = ascc_output_limit(&plan->output)};
     if (side == WALLS) {
         l.area = ascc_wall_areas(c->run);
@@ -605,20 +606,59 @@ static void pass_coefficients(const ascc_pair_reverse *q, const gradients *g)
     }
 }
 
+/* Pairs whose lines are as the network sees them, positions constants. */
+static bool is_simple(const ascc_pair_reverse *q)
+{
+    return !q->place && !q->pass->pass->seen && q->set == ASCC_SET_FLUID;
+}
+
+static ascc_status pass_lines(const ascc_pair_reverse *q, gradients *g)
+{
+    const ascc_reverse *pass = q->pass;
+    const ascc_network_run *run = pass->run;
+    const size_t count = run->hierarchy->set[q->set].count;
+    float *motion = pass->value[0].raw, *force;
+    force = ascc_arena_take(pass->pass->arena, count, 4 * sizeof *force);
+    if (!force)
+        return ASCC_ERROR_MEMORY;
+    for (size_t i = 0; i < count; i++)
+        for (size_t c = 0; c < 4; c++)
+            force[i * 4 + c] = c < 3 ? (float)q->force[i * 3 + c] : 0.0f;
+    g->c.seen = find_seen(run, q->set);
+    for (int side = 0; side < (run->plan->output.has_walls ? SIDES : 1); side++) {
+        const ascc_lines lines = lines_of(&g->c, side);
+        if (!g->side[side])
+            continue;
+        ascc_line_reverse_run(&(ascc_line_reverse){
+            .lines = &lines,
+            .rows = ascc_term_list(run, &run->plan->output.term, side),
+            .kernels = run->tools->kernels,
+            .force = force,
+            .coefficient = g->side[side],
+            .motion = lines.motion && motion ? motion + ascc_plan_motion(run->plan, 0) : NULL});
+    }
+    return ASCC_OK;
+}
+
 static ascc_status backward(ascc_reverse *pass)
 {
     gradients g = {.side = {NULL}};
+    ascc_status status = ASCC_OK;
     ascc_pair_reverse pairs;
     if (!ascc_pair_reverse_open(&pairs, pass) ||
         !find_coefficients(&g.c, pass->run, SIDES, pass->pass->arena, ascc_arena_take) ||
         !take_gradients(&g, pass, pass->run->hierarchy->set[pairs.set].count))
         return ASCC_ERROR_MEMORY;
     pairs.data = &g;
-    ascc_pair_reverse_run(&pairs, visit);
-    if (pass->run->plan->output.has_walls)
-        visit_walls(&pairs);
+    if (is_simple(&pairs)) {
+        status = pass_lines(&pairs, &g);
+    } else {
+        ascc_pair_reverse_run(&pairs, visit);
+        if (pass->run->plan->output.has_walls)
+            visit_walls(&pairs);
+    }
     pass_coefficients(&pairs, &g);
-    return ASCC_OK;
+    return status;
 }
 
 const ascc_operation ascc_op_pairs_basis = {.name = "pairs in a basis",

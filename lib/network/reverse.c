@@ -44,10 +44,30 @@ void ascc_transposed_update(ascc_transposed *transposed, const ascc_plan *plan,
 
 /* ---- Gradients of values ---- */
 
-/* Does anything need the gradient of this value? Features: only for the velocities in them. */
-static bool wants_value(const ascc_reverse *p, int32_t value)
+/* Does the gradient of a layer lead anywhere? Else everything before it is data. */
+static bool leads_on(const ascc_reverse *p, int32_t l)
 {
-    return value >= 2 || (value == 0 && p->pass->velocity);
+    const ascc_layer *layer = &p->run->plan->layer[l];
+    for (int32_t t = layer->first_term; t < layer->first_term + layer->term_count; t++) {
+        const ascc_term *term = &p->run->plan->term[t];
+        if (p->pass->seen ||
+            (!term->operation->leads_to_places && (p->pass->velocity || p->wants[term->source])))
+            return true;
+        for (int i = 0; i < ASCC_MAX_TENSORS; i++)
+            if (term->tensor[i])
+                return true;
+    }
+    return false;
+}
+
+/* Whether anything needs the gradients of values; of features: only for the velocities in them. */
+static bool find_wants(ascc_reverse *p)
+{
+    const int32_t count = p->run->network->value_count;
+    p->wants = ascc_arena_take(p->pass->arena, (size_t)count, sizeof *p->wants);
+    for (int32_t v = 0; p->wants && v < count; v++)
+        p->wants[v] = v >= 2 ? leads_on(p, v - 2) : v == 0 && p->pass->velocity;
+    return p->wants != NULL;
 }
 
 static bool take_gradient(const ascc_reverse *p, const float *value, size_t size, float **gradient)
@@ -67,7 +87,7 @@ static bool take_gradients(ascc_reverse *p)
     for (int32_t v = 0; v < run->network->value_count; v++) {
         const size_t rows = ascc_network_rows(run, ascc_network_set(run->network, v));
         const size_t size = rows * ascc_padded(ascc_network_channels(run->network, v));
-        if (wants_value(p, v) &&
+        if (p->wants[v] &&
             (!take_gradient(p, run->value[v].raw, size, &p->value[v].raw) ||
              !take_gradient(p, run->value[v].rectified, size, &p->value[v].rectified)))
             return false;
@@ -174,7 +194,7 @@ static void add_guesses(const ascc_reverse *p)
 {
     const ascc_hierarchy *h = p->run->hierarchy;
     float *to = p->value[p->run->plan->relaxation.guess].rectified;
-    for (size_t i = 0; i < h->set[ASCC_SET_FLUID].count; i++)
+    for (size_t i = 0; to && i < h->set[ASCC_SET_FLUID].count; i++)
         to[i * ascc_padded(1)] +=
             (float)p->pass->guess[ascc_hierarchy_host_row(h, ASCC_SET_FLUID, i)];
 }
@@ -215,13 +235,14 @@ ascc_status ascc_backward_run(const ascc_backward *pass)
     if (!p.value)
         return ASCC_ERROR_MEMORY;
     memset(p.value, 0, (size_t)p.run->network->value_count * sizeof *p.value);
-    if (!take_gradients(&p))
+    if (!find_wants(&p) || !take_gradients(&p))
         return ASCC_ERROR_MEMORY;
     ascc_status status = plan->output.term.operation->backward_output(&p);
     if (plan->relaxation.guess && pass->guess)
         add_guesses(&p);
     for (int32_t l = plan->layer_count - 1; l >= 0 && status == ASCC_OK; l--)
-        status = pass_layer(&p, l);
+        if (p.wants[l + 2])
+            status = pass_layer(&p, l);
     if (status == ASCC_OK && pass->velocity && (p.value[0].raw || p.value[0].rectified))
         add_velocities(&p);
     return status;

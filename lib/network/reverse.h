@@ -60,6 +60,7 @@ typedef struct ascc_reverse {
     float *scratch;         /* as the operation asked for forwards ... */
     float *dot;             /* ... and for the way back */
     size_t room;
+    bool *wants;              /* [value] whether anything needs its gradient */
     const uint32_t *sequence; /* 0, 1, 2, ... [room] */
     float *joined;            /* [tile][channels] gradient */
 } ascc_reverse;
