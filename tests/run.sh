@@ -1,5 +1,6 @@
 #!/bin/sh
-# Sets up, builds and runs all tests: release and sanitizers. Ends with "N passed, N failed".
+# Sets up, builds and runs all tests, release and sanitizers, as many at a time as there are cores. Ends with
+# "N passed, N failed".
 # SPDX-License-Identifier: MIT
 #
 #   sh tests/run.sh [--long]     --long: a minute of each fuzz target, and more random calls and scenes
@@ -37,7 +38,25 @@ count() {
     grep -E '^(not ok|# SKIP|SKIP)|# SKIP' "$1" | sort | uniq -c
 }
 
-# One whole build in its own folder: NAME, then meson options.
+# Runs what its input names, a log and a command on each line, as many at a time as there are cores; each
+# command's exit status stays beside its log.
+together() {
+    xargs -P "$(nproc 2>/dev/null || echo 2)" -d '\n' -I LINE sh -c '
+        log=${1%% *}
+        sh -c "${1#* }" >"$log" 2>&1
+        echo $? >"$log.status"' - LINE
+}
+
+# Counts a log of `together`; one that failed without saying in what is a failure too.
+result() {
+    count "$1"
+    [ "$(cat "$1.status")" = 0 ] && return
+    echo "not ok - $2 ended with status $(cat "$1.status")"
+    tail -n 25 "$1"
+    [ "$(failures "$1")" -gt 0 ] || failed=$((failed + 1))
+}
+
+# One whole build in its own folder and its programs: NAME, then meson options.
 suite() {
     name=$1
     shift
@@ -53,26 +72,24 @@ suite() {
         failed=$((failed + 1))
         return
     fi
-    for program in "build-$name"/tests/test_*; do
-        [ -x "$program" ] && [ -f "$program" ] || continue
-        log="$program.log"
-        CMOCKA_MESSAGE_OUTPUT=TAP "$program" >"$log" 2>&1
-        status=$?
-        count "$log"
-        if [ $status -ne 0 ]; then
-            echo "not ok - $program ended with status $status"
-            tail -n 25 "$log"
-            [ "$(failures "$log")" -gt 0 ] || failed=$((failed + 1))
-        fi
+    programs=$(find "build-$name/tests" -maxdepth 1 -name 'test_*' -type f -perm -u+x | sort)
+    for program in $programs; do
+        echo "$program.log $program"
+    done | together
+    for program in $programs; do
+        result "$program.log" "$program"
     done
 }
 
-# A script that prints TAP lines itself, and what it is given.
-script() {
-    echo "== $*"
-    log="build-release/$(basename "$1").log"
-    sh "$@" >"$log" 2>&1 || { [ "$(failures "$log")" -gt 0 ] || { tail -n 25 "$log"; failed=$((failed + 1)); }; }
-    count "$log"
+# Scripts that print TAP lines themselves, each with what it is given on a line: those that take long first.
+scripts() {
+    while read -r script arguments; do
+        echo "build-release/$(basename "$script").${arguments%% *}.log sh $script $arguments"
+    done <"$1" | together
+    while read -r script arguments; do
+        echo "== $script $arguments"
+        result "build-release/$(basename "$script").${arguments%% *}.log" "$script"
+    done <"$1"
 }
 
 if [ -n "$long" ]; then
@@ -81,17 +98,35 @@ if [ -n "$long" ]; then
     echo "random calls (test_api_fuzz) and random scenes (test_random_scenes)"
 fi
 export ASAN_OPTIONS=detect_leaks=1
+export CMOCKA_MESSAGE_OUTPUT=TAP
 export UBSAN_OPTIONS=halt_on_error=1:print_stacktrace=1
 suite release --buildtype=release
 suite sanitize --buildtype=debugoptimized -Db_sanitize=address,undefined -Db_lundef=false \
     -Db_ndebug=false -Dc_args=-fsanitize=float-cast-overflow
-for t in tests/check_tree.sh tests/check_tree_test.sh tests/install_test.sh tests/embed_test.sh tests/cli_test.sh tests/view_test.sh tests/train_test.sh tests/docs_test.sh tests/convert_test.sh tests/export_test.sh tests/python_test.sh tests/bench_test.sh tests/stability_test.sh tests/cross_test.sh tests/windows_test.sh tests/web_test.sh tests/hosts_test.sh; do
-    [ -f "$t" ] && script "$t" build-release
-done
-script tests/models_test.sh build-release
-script tests/fuzz_test.sh build-sanitize "$fuzz_seconds"
-script tests/cli_test.sh build-sanitize
-script tests/train_test.sh build-sanitize
+cat >build-release/scripts <<END
+tests/cross_test.sh build-release
+tests/train_test.sh build-sanitize
+tests/fuzz_test.sh build-sanitize $fuzz_seconds
+tests/cli_test.sh build-sanitize
+tests/models_test.sh build-release
+tests/web_test.sh build-release
+tests/check_tree_test.sh build-release
+tests/install_test.sh build-release
+tests/embed_test.sh build-release
+tests/python_test.sh build-release
+tests/stability_test.sh build-release
+tests/convert_test.sh build-release
+tests/export_test.sh build-release
+tests/hosts_test.sh build-release
+tests/bench_test.sh build-release
+tests/docs_test.sh build-release
+tests/view_test.sh build-release
+tests/cli_test.sh build-release
+tests/train_test.sh build-release
+tests/check_tree.sh build-release
+tests/windows_test.sh build-release
+END
+scripts build-release/scripts
 
 echo "$passed passed, $failed failed"
 [ "$failed" -eq 0 ]
