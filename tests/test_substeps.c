@@ -319,6 +319,48 @@ static void a_model_says_what_it_was_trained_for(void **state)
     ascc_context_destroy(&context);
 }
 
+/* Particles that go ten spacings a step, so many spacings from the block and from each other. */
+static void add_fast(const world *w, size_t count, double from_block, double apart)
+{
+    const size_t d = (size_t)w->is.dimension;
+    double x[70 * 3], v[70 * 3];
+    for (size_t i = 0; i < count; i++)
+        for (size_t c = 0; c < d; c++) {
+            x[i * d + c] = c == 0 ? -(from_block + apart * (double)i) * spacing : 6.0 * spacing;
+            v[i * d + c] = c == 1 ? -10.0 * spacing / w->info.time_step : 0.0;
+        }
+    const ascc_const_array position = {.data = x, .scalar = ASCC_DOUBLE},
+                           velocity = {.data = v, .scalar = ASCC_DOUBLE};
+    assert_int_equal(
+        ascc_particles_add_fluid(w->particles, count, &position, &velocity, NULL, NULL), ASCC_OK);
+}
+
+static void fast_ones_that_nobody_meets_cut_no_steps(void **state)
+{
+    (void)state;
+    static const struct {
+        size_t count;
+        double from_block, apart;
+        int32_t substeps;
+    } cases[] = {{1, 1e5, 0.0, 1}, {1, 10.0, 0.0, 4}, {2, 1e5, 10.0, 4},
+                 {2, 1e5, 1e5, 1}, {64, 1e5, 1e5, 1}, {65, 1e5, 1e5, 4}};
+    for (int32_t d = 2; d <= 3; d++)
+        for (size_t k = 0; k < sizeof cases / sizeof *cases; k++) {
+            const scene is = {.dimension = d, .threads = 2};
+            world w = open_world(&is), alone = open_world(&is);
+            add_fast(&w, cases[k].count, cases[k].from_block, cases[k].apart);
+            assert_int_equal(run(&w, 1), ASCC_OK);
+            assert_int_equal(run(&alone, 1), ASCC_OK);
+            if (statistics_of(&w).substeps != cases[k].substeps)
+                fail_msg("case %zu: %d substeps", k, (int)statistics_of(&w).substeps);
+            if (cases[k].substeps == 1) /* the block as without them, to the bit */
+                assert_memory_equal(w.particles->position, alone.particles->position,
+                                    alone.particles->fluid_count * (size_t)d * sizeof(double));
+            close_world(&w);
+            close_world(&alone);
+        }
+}
+
 static void what_a_bound_forbids_is_refused_and_nothing_has_changed(void **state)
 {
     (void)state;
@@ -388,6 +430,7 @@ int main(void)
         cmocka_unit_test(other_spacings_are_the_same_scene_to_rounding),
         cmocka_unit_test(steps_are_cut_until_time_gravity_and_ways_are_in_range),
         cmocka_unit_test(a_model_says_what_it_was_trained_for),
+        cmocka_unit_test(fast_ones_that_nobody_meets_cut_no_steps),
         cmocka_unit_test(what_a_bound_forbids_is_refused_and_nothing_has_changed),
         cmocka_unit_test(without_substeps_a_step_is_one_whatever_the_range),
         cmocka_unit_test(substeps_are_the_same_for_any_number_of_threads),

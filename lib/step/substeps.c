@@ -8,6 +8,8 @@
 #include <math.h>
 #include <string.h>
 
+#include "lone.h"
+
 #define SPACING_TOLERANCE 1e-3 /* of the model's: spacings are told in floats, too */
 #define ROUNDING 1e-6          /* of a count: what it rests on are quotients */
 #define MAX_SUBSTEPS 1000
@@ -24,8 +26,8 @@ void ascc_find_units(ascc_step *step, const ascc_particles *p)
 
 typedef struct extremes_job {
     const ascc_particles *p;
-    const double *acceleration;        /* or NULL */
-    atomic_uint_least64_t speed, push; /* squares of the largest, as bits */
+    const double *acceleration;                    /* or NULL */
+    atomic_uint_least64_t speed, wall_speed, push; /* squares of the largest, as bits */
 } extremes_job;
 
 /* Bits of numbers >= 0 are in the order of the numbers, so that no order of threads matters. */
@@ -82,7 +84,7 @@ static void look_at_walls(void *data, size_t begin, size_t end, int32_t slot)
     double speed = 0.0;
     for (size_t i = begin; i < end; i++)
         speed = fmax(speed, square_of(job->p->wall_velocity + i * d, d));
-    raise_to(&job->speed, speed);
+    raise_to(&job->wall_speed, speed);
 }
 
 /* ---- How many steps ---- */
@@ -98,6 +100,19 @@ static bool is_too_far(const ascc_motion *motion, double way)
     return motion->max_displacement > 0.0 && !(way <= motion->max_displacement);
 }
 
+/* Of the fluid: a particle too fast for a whole step counts where it may meet another. */
+static double speed_that_counts(const ascc_step *step, const ascc_particles *p, double fastest,
+                                double push)
+{
+    const ascc_plan *plan = &step->model->plan;
+    const double dt = step->time_step, slow = p->spacing * plan->way_max / dt - push * dt;
+    if (!(fastest > slow) || isinf(fastest))
+        return fastest;
+    const double way = (fastest + push * dt) * dt;
+    return ascc_speed_in_company(step->context, p, fastest, slow,
+                                 ascc_plan_receptive_radius(plan) / step->model_length + 2.0 * way);
+}
+
 ascc_status ascc_count_substeps(ascc_step *step, const ascc_particles *p, const ascc_motion *motion,
                                 int32_t *count)
 {
@@ -111,7 +126,9 @@ ascc_status ascc_count_substeps(ascc_step *step, const ascc_particles *p, const 
     ascc_workers_run(step->context->workers, p->fluid_count, 8192, look_at_fluid, &job);
     ascc_workers_run(step->context->workers, p->boundary_count, 8192, look_at_walls, &job);
     const double push = sqrt(square_of(motion->gravity, 3)) + root_of(&job.push);
-    const double speed = root_of(&job.speed), gravity = push * dt * dt / h;
+    const double gravity = push * dt * dt / h;
+    const double speed =
+        fmax(speed_that_counts(step, p, root_of(&job.speed), push), root_of(&job.wall_speed));
     double steps = steps_for(dt * step->model_time / plan->time_step_max);
     if (!is_too_far(motion, (speed + push * dt / steps) * dt / steps)) {
         steps = fmax(steps, steps_for(sqrt(gravity / plan->gravity_max)));
