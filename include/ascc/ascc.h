@@ -678,9 +678,9 @@ typedef struct ascc_step_options {
     int32_t max_neighbors;   /* most neighbours of one point before LIMIT is returned; 0 = 4096 */
     int32_t substeps; /* what a time step is cut into, equal steps, so that the length of each,
                               * gravity and the way of the fastest particle (but for a few that nobody
-                              * can meet) lie in the range that the
-                              * model was trained for (ascc_model_info): 0 = as many as it takes, n = at
-                              * most n, else RANGE; -1 = none, whatever the range */
+                              * can meet) lie in the range that the model was trained for
+                              * (ascc_model_info): 0 = as many as it takes, n = at most n, else RANGE;
+                              * -1 = none, whatever the range */
     /* Parts of the fluid that stay slower for half a second stop, until something wakes them (docs/sleeping.md);
      * in speeds that gravity gives in a time step: 0.5 is a good one. 0 = none stops, and what had stopped wakes. */
     double sleep_speed;

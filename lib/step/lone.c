@@ -16,6 +16,7 @@ typedef struct lone_job {
     double reach;     /* squared */
     size_t row[MOST]; /* of the fast ones */
     size_t count;
+    const double *place; /* of those that they may meet: fluid, then walls */
     atomic_uint_least64_t
         near; /* of which these have company; the order of threads doesn't matter */
 } lone_job;
@@ -23,46 +24,37 @@ typedef struct lone_job {
 static double speed_of(const ascc_particles *p, size_t i)
 {
     double square = 0.0;
-    for (size_t c = 0, d = (size_t)p->dimension; c < d; c++) {
-        const double v = (double)p->momentum[i * d + c] * p->quantum / p->mass[i];
+    for (int32_t c = 0; c < p->dimension; c++) {
+        const double v = ascc_velocity(p, i, c);
         square += v * v;
     }
     return sqrt(square);
 }
 
-/* Fast ones near to a point; row: its own, if it is a particle's. */
-static uint64_t near_to(const lone_job *job, const double *x, size_t row)
+/* Fast ones near to row i of the places; nobody keeps itself company. */
+static uint64_t near_to(const lone_job *job, size_t i)
 {
     const size_t d = (size_t)job->p->dimension;
+    const double *x = job->place + i * d;
     uint64_t near = 0;
     for (size_t n = 0; n < job->count; n++) {
         const double *other = job->p->position + job->row[n] * d;
         double square = 0.0;
         for (size_t c = 0; c < d; c++)
             square += (x[c] - other[c]) * (x[c] - other[c]);
-        if (square <= job->reach && job->row[n] != row)
+        if (square <= job->reach && x != other)
             near |= (uint64_t)1 << n;
     }
     return near;
 }
 
-static void look_at_fluid(void *data, size_t begin, size_t end, int32_t slot)
+static void look_around(void *data, size_t begin, size_t end, int32_t slot)
 {
     (void)slot;
     lone_job *job = data;
     uint64_t near = 0;
     for (size_t i = begin; i < end; i++)
-        near |= near_to(job, job->p->position + i * (size_t)job->p->dimension, i);
-    (void)atomic_fetch_or_explicit(&job->near, near, memory_order_relaxed);
-}
-
-static void look_at_walls(void *data, size_t begin, size_t end, int32_t slot)
-{
-    (void)slot;
-    lone_job *job = data;
-    uint64_t near = 0;
-    for (size_t i = begin; i < end; i++)
-        near |= near_to(job, job->p->wall_position + i * (size_t)job->p->dimension, SIZE_MAX);
+        near |= near_to(job, i);
     (void)atomic_fetch_or_explicit(&job->near, near, memory_order_relaxed);
 }
 
@@ -80,8 +72,10 @@ double ascc_speed_in_company(ascc_context *context, const ascc_particles *p, dou
         else
             job.row[job.count++] = i;
     }
-    ascc_workers_run(context->workers, p->fluid_count, 8192, look_at_fluid, &job);
-    ascc_workers_run(context->workers, p->boundary_count, 8192, look_at_walls, &job);
+    job.place = p->position;
+    ascc_workers_run(context->workers, p->fluid_count, 8192, look_around, &job);
+    job.place = p->wall_position;
+    ascc_workers_run(context->workers, p->boundary_count, 8192, look_around, &job);
     const uint64_t near = atomic_load_explicit(&job.near, memory_order_relaxed);
     for (size_t n = 0; n < job.count; n++)
         if (near >> n & 1)

@@ -66,8 +66,8 @@ static void look_at_fluid(void *data, size_t begin, size_t end, int32_t slot)
     double speed = 0.0, push = 0.0;
     for (size_t i = begin; i < end; i++) {
         double v[3] = {0.0, 0.0, 0.0};
-        for (size_t c = 0; c < d; c++)
-            v[c] = (double)p->momentum[i * d + c] * p->quantum / p->mass[i];
+        for (int32_t c = 0; c < p->dimension; c++)
+            v[c] = ascc_velocity(p, i, c);
         speed = fmax(speed, square_of(v, d));
         if (job->acceleration)
             push = fmax(push, square_of(job->acceleration + i * d, d));
