@@ -68,6 +68,11 @@ static ascc_gradients gradients(const relaxation *r)
 
 /* ---- Memory ---- */
 
+static ascc_status no_memory(const ascc_step_state *state)
+{
+    return ascc_fail(state->tools.message, ASCC_ERROR_MEMORY, "no memory for the relaxation");
+}
+
 /* Lent, but taken if a way back reads it. */
 static void *room_for(const relaxation *r, size_t count, size_t element)
 {
@@ -461,7 +466,7 @@ static ascc_status open_relaxation(relaxation *r, ascc_step_state *state, bool s
     if (status != ASCC_OK)
         return status;
     if (!lend_volumes(r) || !lend_wall_places(r) || !lend_wall_moves(r) || !lend_memory(r))
-        return ascc_fail(tools->message, ASCC_ERROR_MEMORY, "no memory for the relaxation");
+        return no_memory(state);
     ascc_workers_run(tools->workers, r->count, 4 * ROWS, find_places, r);
     const size_t bad = atomic_load(&r->bad);
     if (bad) {
@@ -472,9 +477,7 @@ static ascc_status open_relaxation(relaxation *r, ascc_step_state *state, bool s
                          state->particles->id[row], row);
     }
     ascc_workers_run(tools->workers, r->count, ROWS, look_around, r);
-    return r->trace && !begin_trace(r)
-               ? ascc_fail(tools->message, ASCC_ERROR_MEMORY, "no memory for the relaxation")
-               : ASCC_OK;
+    return r->trace && !begin_trace(r) ? no_memory(state) : ASCC_OK;
 }
 
 /* ---- Sweeps ---- */
@@ -737,11 +740,6 @@ static int64_t *lend_given(ascc_step_state *state)
     const ascc_particles *p = state->particles;
     return ascc_arena_lend(state->tools.arena, p->fluid_count * (size_t)p->dimension,
                            sizeof(int64_t));
-}
-
-static ascc_status no_memory(const ascc_step_state *state)
-{
-    return ascc_fail(state->tools.message, ASCC_ERROR_MEMORY, "no memory for the relaxation");
 }
 
 /* Positions before the step; false without memory. */
