@@ -82,6 +82,14 @@ static bool learned_open(const char *settings, const ascc_method_scene *scene, v
 
 enum { WALLS = 0 };
 
+static ascc_status add_fluid(learned *m, size_t count, const double *position,
+                             const double *velocity)
+{
+    const ascc_const_array x = {.data = position, .scalar = ASCC_DOUBLE};
+    const ascc_const_array v = {.data = velocity, .scalar = ASCC_DOUBLE};
+    return ascc_particles_add_fluid(m->particles, count, &x, &v, NULL, NULL);
+}
+
 static ascc_status add_walls(learned *m, size_t count)
 {
     const ascc_const_array wall = {.data = m->scene->wall, .scalar = ASCC_DOUBLE};
@@ -116,11 +124,8 @@ static ascc_status add_body(learned *m, size_t first)
 
 static ascc_status learned_fill(learned *m, const double *position, const double *velocity)
 {
-    const ascc_const_array x = {.data = position, .scalar = ASCC_DOUBLE};
-    const ascc_const_array v = {.data = velocity, .scalar = ASCC_DOUBLE};
     const size_t body = m->scene->wall_count - m->scene->body_count;
-    ascc_status status =
-        ascc_particles_add_fluid(m->particles, m->scene->fluid_count, &x, &v, NULL, NULL);
+    ascc_status status = add_fluid(m, m->scene->fluid_count, position, velocity);
     if (status == ASCC_OK)
         status = add_walls(m, body);
     if (status == ASCC_OK && m->scene->body_count)
@@ -231,9 +236,7 @@ static bool learned_add_fluid(void *state, size_t count, const double *position,
                               const double *velocity, ascc_method_error *error)
 {
     learned *m = state;
-    const ascc_const_array x = {.data = position, .scalar = ASCC_DOUBLE};
-    const ascc_const_array v = {.data = velocity, .scalar = ASCC_DOUBLE};
-    if (ascc_particles_add_fluid(m->particles, count, &x, &v, NULL, NULL) == ASCC_OK)
+    if (add_fluid(m, count, position, velocity) == ASCC_OK)
         return true;
     snprintf(error->text, sizeof error->text, "%s", ascc_particles_message(m->particles));
     return false;
