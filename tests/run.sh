@@ -82,13 +82,16 @@ suite() {
 }
 
 # Scripts that print TAP lines themselves, each with what it is given on a line: those that take long first.
+script_log() {
+    echo "build-release/$(basename "$1").$2.log"
+}
 scripts() {
     while read -r script arguments; do
-        echo "build-release/$(basename "$script").${arguments%% *}.log sh $script $arguments"
+        echo "$(script_log "$script" "${arguments%% *}") sh $script $arguments"
     done <"$1" | together
     while read -r script arguments; do
         echo "== $script $arguments"
-        result "build-release/$(basename "$script").${arguments%% *}.log" "$script"
+        result "$(script_log "$script" "${arguments%% *}")" "$script"
     done <"$1"
 }
 
