@@ -4,6 +4,7 @@ TAP output. Published samples are looked for in $ASCC_SHARED, or ../shared besid
 the original checkpoints in $ASCC_CHECKPOINTS. Tests that need what is not there say so and skip."""
 
 import contextlib
+import importlib.util
 import io
 import json
 import os
@@ -469,6 +470,31 @@ class Gns(Case):
             "velocity_frames": "first",
         }
         self.assertEqual({key: metadata[key] for key in expected}, expected)
+
+    @unittest.skipUnless(importlib.util.find_spec("tfrecord"), "the package tfrecord is not here")
+    def test_files_of_another_writer_are_read(self):
+        import tfrecord  # protocol buffers and CRC are not ours; the shapes are those of Water-Ramps
+
+        self.file(sequence_length=600)
+        random = np.random.default_rng(3)
+        ramp = np.stack([np.linspace(0.2, 0.8, 400), np.linspace(0.3, 0.2, 400)], 1)
+        lattice = np.stack(np.meshgrid(np.arange(46), np.arange(46)), -1).reshape(-1, 2)
+        kinds, scenes = np.repeat([3, 5], [400, 2116]), []
+        writer = tfrecord.TFRecordWriter(self.path("test.tfrecord"))
+        for key in range(2):
+            water = lattice * 0.005 + [0.4, 0.5] + random.uniform(-0.001, 0.001, (601, 2116, 2))
+            frames = [np.float32(np.concatenate([ramp, w])) for w in water]
+            scenes.append(np.stack(frames))
+            writer.write(
+                {"key": (key, "int"), "particle_type": (kinds.astype("<i8").tobytes(), "byte")},
+                {"position": ([frame.tobytes() for frame in frames], "byte")},
+            )
+        writer.close()
+        files = self.converted("gns", self.path("test.tfrecord"), "--spacing", 0.005)
+        self.assertEqual(list(files), ["test_00000", "test_00001"])
+        for (tensors, _), scene in zip(files.values(), scenes):
+            self.assertTrue(np.array_equal(tensors["fluid.position"], scene[1:, 400:]))
+            self.assertTrue(np.array_equal(tensors["boundary.position"][:400], scene[0, :400]))
 
     def test_count_wall_layers_and_fluid_types_are_options(self):
         kinds, position = self.scene()
