@@ -182,6 +182,50 @@ static void a_new_set_is_empty(void **state)
     assert_int_equal(ascc_particles_body_impulse(self->set, -1, NULL, total, NULL), ASCC_OK);
 }
 
+static void an_earlier_velocity_is_that_of_all_steps_before_it(void **state)
+{
+    fixture *const self = *state;
+    double x[2][3] = {{0}, {1, 0, 0}}, v[2][3] = {{1, 2, 3}, {4, 5, 6}}, read[2][3];
+    const ascc_const_array place = {.data = x, .scalar = ASCC_DOUBLE};
+    const ascc_const_array in = {.data = v, .scalar = ASCC_DOUBLE};
+    const ascc_const_array second = {.data = v[1], .scalar = ASCC_DOUBLE};
+    const ascc_array out = {.data = read, .scalar = ASCC_DOUBLE};
+    const ascc_particles_options options = {.size = sizeof options, .dimension = 3, .spacing = 1};
+    ascc_particles *set;
+    assert_int_equal(ascc_particles_create(self->context, &options, &set), ASCC_OK);
+    assert_int_equal(ascc_particles_add_fluid(set, 2, &place, &in, NULL, NULL), ASCC_OK);
+#define EARLIER(ago) ((ascc_field)(ASCC_EARLIER_VELOCITY + (ago)))
+#define READS(ago, row, number)                                                                    \
+    do {                                                                                           \
+        assert_int_equal(ascc_particles_get(set, ASCC_FLUID, EARLIER(ago), 0, 2, &out), ASCC_OK);  \
+        assert_true(fabs(read[row][0] - (number)) < 1e-6);                                         \
+    } while (0)
+    READS(7, 1, 4.0); /* as it does now */
+    assert_int_equal(ascc_particles_set(set, ASCC_FLUID, EARLIER(2), 0, 1, &second), ASCC_OK);
+    READS(1, 0, 1.0);
+    READS(2, 0, 4.0);
+    READS(7, 0, 4.0);
+    READS(2, 1, 4.0);
+    assert_int_equal(ascc_particles_set(set, ASCC_FLUID, EARLIER(0), 0, 2, &in), ASCC_OK);
+    READS(7, 0, 1.0);
+    v[0][0] = 7;
+    assert_int_equal(ascc_particles_set(set, ASCC_FLUID, ASCC_VELOCITY, 0, 2, &in), ASCC_OK);
+    READS(0, 0, 7.0);
+    v[1][2] = (double)NAN;
+    assert_int_equal(ascc_particles_set(set, ASCC_FLUID, EARLIER(0), 0, 2, &in),
+                     ASCC_ERROR_NOT_FINITE);
+    v[1][2] = 1e300;
+    assert_int_equal(ascc_particles_set(set, ASCC_FLUID, EARLIER(0), 0, 2, &in), ASCC_ERROR_RANGE);
+    READS(0, 0, 7.0);
+    assert_int_equal(ascc_particles_get(set, ASCC_FLUID, EARLIER(8), 0, 2, &out),
+                     ASCC_ERROR_ARGUMENT);
+    assert_int_equal(ascc_particles_get(set, ASCC_BOUNDARY, EARLIER(0), 0, 0, &out),
+                     ASCC_ERROR_ARGUMENT);
+    ascc_particles_destroy(&set);
+#undef READS
+#undef EARLIER
+}
+
 static void options_out_of_range_are_refused(void **state)
 {
     fixture *const self = *state;
@@ -1890,6 +1934,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         IN_3D(a_new_set_is_empty),
+        IN_3D(an_earlier_velocity_is_that_of_all_steps_before_it),
         IN_3D(options_out_of_range_are_refused),
         IN_3D(longer_options_are_read_if_their_tail_is_zero),
         IN_2D(the_default_quantum_is_2_to_the_minus_28_of_the_power_of_two_below),

@@ -211,6 +211,13 @@ class Arrays(Case):
                 self.set.add_fluid(wrong)
         self.assertEqual(len(self.set), 12)
 
+    def test_earlier_velocities_are_set_and_read_one_by_one(self):
+        self.set.add_fluid(ascc.block((0, 0), (3, 4), 0.01), velocity=(1, 2))
+        values = np.arange(24.0).reshape(12, 2)
+        self.set.set(FLUID, ascc.EARLIER_VELOCITY + 1, values)
+        np.testing.assert_array_equal(self.set.get(FLUID, ascc.EARLIER_VELOCITY + 3), values)
+        np.testing.assert_array_equal(self.set.get(FLUID, ascc.EARLIER_VELOCITY), self.set.velocity)
+
     def test_other_numbers_are_copied_and_what_is_none_refused(self):
         self.set.add_fluid([[0, 1], [2, 3]])
         self.set.add_fluid(np.arange(4, dtype=np.int8).reshape(2, 2))

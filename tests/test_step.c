@@ -606,6 +606,42 @@ static void a_history_is_what_the_velocities_were(void **state)
     close_world(&w);
 }
 
+static void copy_fluid_field(const world *from, const world *to, int field)
+{
+    double values[2 * 200];
+    const size_t n = from->particles->fluid_count;
+    const ascc_array out = {.data = values, .scalar = ASCC_DOUBLE};
+    const ascc_const_array in = {.data = values, .scalar = ASCC_DOUBLE};
+    assert_true(n <= 200);
+    assert_int_equal(ascc_particles_get(from->particles, ASCC_FLUID, (ascc_field)field, 0, n, &out),
+                     ASCC_OK);
+    assert_int_equal(ascc_particles_set(to->particles, ASCC_FLUID, (ascc_field)field, 0, n, &in),
+                     ASCC_OK);
+}
+
+static void a_run_goes_on_from_fields_that_the_host_has_read(void **state)
+{
+    (void)state;
+    const world_options o = {
+        .dimension = 2, .threads = 1, .random_network = true, .graph = 1, .history = 3};
+    world a = open_world(&o), b = open_world(&o), forgets = open_world(&o);
+    run(&a, no_gravity, 5);
+    for (int field = ASCC_POSITION; field <= ASCC_VELOCITY; field++) {
+        copy_fluid_field(&a, &b, field);
+        copy_fluid_field(&a, &forgets, field);
+    }
+    for (int ago = 0; ago < 3; ago++)
+        copy_fluid_field(&a, &b, ASCC_EARLIER_VELOCITY + ago);
+    run(&a, no_gravity, 5);
+    run(&b, no_gravity, 5);
+    run(&forgets, no_gravity, 5);
+    assert_true(ascc_particles_hash(a.particles) == ascc_particles_hash(b.particles));
+    assert_true(ascc_particles_hash(a.particles) != ascc_particles_hash(forgets.particles));
+    close_world(&a);
+    close_world(&b);
+    close_world(&forgets);
+}
+
 /* ---- Units and forces ---- */
 
 static void a_host_in_centimetres_gets_the_same_motion(void **state)
@@ -1575,6 +1611,7 @@ int main(void)
         cmocka_unit_test(many_steps_at_once_equal_single_steps),
         cmocka_unit_test(a_restored_run_goes_on_bit_for_bit),
         cmocka_unit_test(a_history_is_what_the_velocities_were),
+        cmocka_unit_test(a_run_goes_on_from_fields_that_the_host_has_read),
         cmocka_unit_test(a_host_in_centimetres_gets_the_same_motion),
         cmocka_unit_test(gravity_is_seen_alike_in_every_unit),
         cmocka_unit_test(nothing_passes_a_wall_with_contact),

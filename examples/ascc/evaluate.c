@@ -23,7 +23,8 @@ static const size_t ERROR_FRAMES[] = {1, 2, 5, 10, 20, 50};
 enum {
     ENERGY_COUNT = sizeof ENERGY_FRAMES / sizeof *ENERGY_FRAMES,
     ERROR_COUNT = sizeof ERROR_FRAMES / sizeof *ERROR_FRAMES,
-    SUBSET = 2000 /* particles of an exact assignment where all are too many */
+    SUBSET = 2000, /* particles of an exact assignment where all are too many */
+    LOOK_BACK = 8  /* frames before a true state that methods are told of */
 };
 
 const ascc_method *ascc_method_find(const char *word, const char **settings)
@@ -151,13 +152,26 @@ typedef struct bench {
 
 /* ---- One and two frames ---------------------------------------------------------------------- */
 
+/* What a method that looks back can know in a frame, by frame difference. */
+static bool look_back(bench *b, size_t frame, ascc_method_error *why)
+{
+    for (size_t ago = 0; b->method->look_back && ago < LOOK_BACK && frame >= ago + 2; ago++) {
+        const double *velocity =
+            true_velocity(b->truth, frame - ago - 1, ASCC_VELOCITY_DIFFERENCE, b->true_velocity);
+        if (!b->method->look_back(b->state, ago, velocity, why))
+            return false;
+    }
+    return true;
+}
+
 /* Mean error after one and two frames from a true state. False: the method gave up. */
 static bool two_frames(bench *b, size_t frame, ascc_velocity_kind kind, double error[2],
                        ascc_method_error *why)
 {
     const ascc_truth *t = b->truth;
     const double *velocity = true_velocity(t, frame, kind, b->true_velocity);
-    if (!b->method->set(b->state, t->position + frame * row_of(t), velocity, kind, why))
+    if (!b->method->set(b->state, t->position + frame * row_of(t), velocity, kind, why) ||
+        !look_back(b, frame, why))
         return false;
     for (size_t n = 0; n < 2; n++) {
         if (!b->method->advance(b->state, why))

@@ -48,6 +48,9 @@ typedef struct ascc_method {
     /* Places the fluid; may be called many times, and forgets what was before. */
     bool (*set)(void *state, const double *position, const double *velocity,
                 ascc_velocity_kind kind, ascc_method_error *error);
+    /* Velocities of the fluid that was set before its last frames, the latest, 0 frames ago, first; NULL if the method
+     * does not look back. */
+    bool (*look_back)(void *state, size_t ago, const double *velocity, ascc_method_error *error);
     /* One frame; false if the method cannot go on (the state is then as good as closed). */
     bool (*advance)(void *state, ascc_method_error *error);
     void (*read)(const void *state, double *position, double *velocity);

@@ -179,6 +179,19 @@ static bool move_body(learned *m, const double velocity[3], const double spin[3]
     return status == ASCC_OK;
 }
 
+static bool learned_look_back(void *state, size_t ago, const double *velocity,
+                              ascc_method_error *error)
+{
+    const learned *m = state;
+    const ascc_const_array v = {.data = velocity, .scalar = ASCC_DOUBLE};
+    const ascc_field field = (ascc_field)(ASCC_EARLIER_VELOCITY + (int)ago);
+    if (ascc_particles_set(m->particles, ASCC_FLUID, field, 0, m->scene->fluid_count, &v) ==
+        ASCC_OK)
+        return true;
+    snprintf(error->text, sizeof error->text, "%s", ascc_particles_message(m->particles));
+    return false;
+}
+
 static bool learned_advance(void *state, ascc_method_error *error)
 {
     learned *m = state;
@@ -248,6 +261,7 @@ const ascc_method ascc_method_model = {
             "demonstration model",
     .open = learned_open,
     .set = learned_set,
+    .look_back = learned_look_back,
     .advance = learned_advance,
     .read = learned_read,
     .impulses = learned_impulses,

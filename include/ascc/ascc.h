@@ -235,6 +235,10 @@ typedef enum ascc_field {
     ASCC_VELOCITY = 1,
     ASCC_MASS = 2,   /* fluid; kg, one number. Setting it keeps the velocity */
     ASCC_NORMAL = 3, /* boundary; points into the fluid, length 1 */
+    /* Fluid; the velocity before the last step; + 1: before the one before that; up to + 7. For models that look back
+     * (graph networks). A particle counts as having moved all the time before as it did in the earliest of these that is
+     * known, or as it does: setting one sets those before it, too, and setting ASCC_VELOCITY all of them. */
+    ASCC_EARLIER_VELOCITY = 16,
 } ascc_field;
 
 typedef enum ascc_scalar { ASCC_FLOAT = 0, ASCC_DOUBLE = 1 } ascc_scalar;

@@ -60,6 +60,12 @@ static ascc_status check_rows(const ascc_particles *particles, ascc_kind kind, s
     return ASCC_OK;
 }
 
+/* Steps ago, of an earlier velocity. */
+static int32_t age_of(ascc_field name)
+{
+    return (int32_t)name - (int32_t)ASCC_EARLIER_VELOCITY;
+}
+
 /* And which of the fields is meant. */
 static ascc_status check_field(const ascc_particles *particles, ascc_kind kind, ascc_field name,
                                size_t first, size_t count, ascc_field_index *field,
@@ -68,6 +74,10 @@ static ascc_status check_field(const ascc_particles *particles, ascc_kind kind, 
     const ascc_status status = check_rows(particles, kind, first, count, message);
     if (status != ASCC_OK)
         return status;
+    if (kind == ASCC_FLUID && age_of(name) >= 0 && age_of(name) < ASCC_MAX_HISTORY) {
+        *field = ASCC_FIELD_past;
+        return ASCC_OK;
+    }
     for (int i = 0; i < ASCC_FIELD_COUNT; i++) {
         const int32_t access = ascc_particle_fields[i].access;
         if (access >= 0 && access == (int32_t)name && ascc_particle_fields[i].kind == kind) {
@@ -77,6 +87,41 @@ static ascc_status check_field(const ascc_particles *particles, ascc_kind kind, 
     }
     return ascc_fail(message, ASCC_ERROR_ARGUMENT, "field: %d is not one of %s particles",
                      (int)name, kind == ASCC_FLUID ? "fluid" : "boundary");
+}
+
+/* Numbers of a row as the host has them: earlier velocities one by one. */
+static int32_t numbers_of(const ascc_particles *particles, ascc_field_index field)
+{
+    return ascc_field_numbers(&ascc_particle_fields[field], particles->dimension, 1);
+}
+
+/* What was before is as this one. */
+static ascc_status set_past(ascc_particles *particles, int32_t age, size_t first, size_t count,
+                            const ascc_host_array *from, ascc_message *message)
+{
+    const size_t d = (size_t)particles->dimension;
+    const ascc_status status =
+        ascc_field_check(particles, ASCC_FIELD_wall_velocity, from, count, message);
+    if (status != ASCC_OK)
+        return status;
+    if (particles->past_count <= age && !ascc_particles_arrange(particles, 0, 0, age + 1))
+        return ascc_fail(message, ASCC_ERROR_MEMORY, "no memory for %d velocities of %zu particles",
+                         (int)age + 1, particles->fluid_count);
+    for (size_t row = 0; row < count; row++)
+        for (size_t c = 0; c < d; c++)
+            particles->past[((first + row) * (size_t)particles->past_count + (size_t)age) * d + c] =
+                ascc_host_array_read(from, row, (int32_t)c);
+    ascc_particles_fill_past(particles, first, count, age + 1);
+    return ASCC_OK;
+}
+
+static double past_of(const ascc_particles *particles, int32_t age, size_t row, int32_t c)
+{
+    const int32_t known = particles->past_count, at = age < known ? age : known - 1;
+    return known
+               ? particles->past[(row * (size_t)known + (size_t)at) * (size_t)particles->dimension +
+                                 (size_t)c]
+               : ascc_velocity(particles, row, c);
 }
 
 static ascc_status set_field(ascc_particles *particles, ascc_field_index field, size_t first,
@@ -115,10 +160,7 @@ ascc_status ascc_particles_set(ascc_particles *particles, ascc_kind kind, ascc_f
     ascc_status status = check_field(particles, kind, field, first, count, &which, &message);
     if (status == ASCC_OK && count > 0)
         status =
-            ascc_host_array_open("values", values,
-                                 ascc_field_numbers(&ascc_particle_fields[which],
-                                                    particles->dimension, particles->past_count),
-                                 &from, &message);
+            ascc_host_array_open("values", values, numbers_of(particles, which), &from, &message);
     if (status == ASCC_OK && kind == ASCC_BOUNDARY)
         status = ascc_bodies_check_free(particles, first, count, &message);
     if (status == ASCC_OK && count > 0) {
@@ -126,7 +168,9 @@ ascc_status ascc_particles_set(ascc_particles *particles, ascc_kind kind, ascc_f
         const bool wakes = which != ASCC_FIELD_wall_velocity;
         if (wakes)
             ascc_rest_disturb(particles, kind, first, count);
-        status = set_field(particles, which, first, count, &from, &message);
+        status = which == ASCC_FIELD_past
+                     ? set_past(particles, age_of(field), first, count, &from, &message)
+                     : set_field(particles, which, first, count, &from, &message);
         if (wakes)
             ascc_rest_disturb(particles, kind, first, count);
     }
@@ -140,8 +184,7 @@ static double field_value(const ascc_particles *particles, ascc_field_index fiel
     const ascc_particle_field *const what = &ascc_particle_fields[field];
     if (field == ASCC_FIELD_momentum)
         return ascc_velocity(particles, row, c);
-    const size_t numbers =
-        (size_t)ascc_field_numbers(what, particles->dimension, particles->past_count);
+    const size_t numbers = (size_t)numbers_of(particles, field);
     return ((const double *)ascc_field_rows(particles, what))[row * numbers + (size_t)c];
 }
 
@@ -162,17 +205,18 @@ ascc_status ascc_particles_get(const ascc_particles *particles, ascc_kind kind, 
     ascc_host_array opened;
     int32_t numbers = 0;
     if (status == ASCC_OK) {
-        numbers = ascc_field_numbers(&ascc_particle_fields[which], particles->dimension,
-                                     particles->past_count);
+        numbers = numbers_of(particles, which);
         status = ascc_host_array_open("values", &described, numbers, &opened, &message);
     }
     if (status != ASCC_OK)
         return ascc_particles_fail_reading(particles, status, "%s", message.text);
     for (size_t row = 0; row < count; row++)
         for (int32_t c = 0; c < numbers; c++)
-            ascc_scalar_write((unsigned char *)into.data + (ptrdiff_t)row * opened.row +
-                                  c * opened.component,
-                              into.scalar, field_value(particles, which, first + row, c));
+            ascc_scalar_write(
+                (unsigned char *)into.data + (ptrdiff_t)row * opened.row + c * opened.component,
+                into.scalar,
+                which == ASCC_FIELD_past ? past_of(particles, age_of(field), first + row, c)
+                                         : field_value(particles, which, first + row, c));
     return ASCC_OK;
 }
 

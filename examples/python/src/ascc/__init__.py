@@ -42,6 +42,7 @@ from ._scenes import block, box, surface
 
 FLUID, BOUNDARY = Kind.FLUID, Kind.BOUNDARY
 POSITION, VELOCITY, MASS, NORMAL = Field.POSITION, Field.VELOCITY, Field.MASS, Field.NORMAL
+EARLIER_VELOCITY = Field.EARLIER_VELOCITY
 
 __version__ = "0.1.0"
 __all__ = [

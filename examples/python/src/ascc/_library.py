@@ -45,12 +45,16 @@ class Kind(IntEnum):
 
 
 class Field(IntEnum):
-    """A property of a particle: POSITION of both kinds, VELOCITY and MASS of fluid, NORMAL of boundary."""
+    """A property of a particle: POSITION of both kinds, VELOCITY and MASS of fluid, NORMAL of boundary.
+
+    EARLIER_VELOCITY is that before the last step, EARLIER_VELOCITY + 1 that before the one before it, up to + 7:
+    setting one sets those before it, too, setting VELOCITY all of them."""
 
     POSITION = 0
     VELOCITY = 1
     MASS = 2
     NORMAL = 3
+    EARLIER_VELOCITY = 16
 
 
 # ---- Structs ----

@@ -446,12 +446,13 @@ class Particles(_Handle):
 
     # Fields
 
-    def _components(self, field: Field) -> int:
+    def _components(self, field: int) -> int:
         return 1 if field == Field.MASS else self.dimension
 
-    def set(self, kind: Kind, field: Field, values: ArrayLike, first: int = 0) -> None:
-        """Sets a field of as many rows as values has, from `first` on."""
-        array = rows_of(field.name.lower(), values, self._components(field))
+    def set(self, kind: Kind, field: int, values: ArrayLike, first: int = 0) -> None:
+        """Sets a Field of as many rows as values has, from `first` on."""
+        name = field.name.lower() if isinstance(field, Field) else f"field {field}"
+        array = rows_of(name, values, self._components(field))
         with self._guard:
             self._check(
                 library.particles_set(
@@ -467,14 +468,14 @@ class Particles(_Handle):
     def get(
         self,
         kind: Kind,
-        field: Field,
+        field: int,
         first: int = 0,
         count: Optional[int] = None,
         *,
         out: Optional[Numbers] = None,
         dtype: DTypeLike = np.float32,
     ) -> Numbers:
-        """A field of rows [first, first + count); count None: of all from `first` on.
+        """A Field of rows [first, first + count); count None: of all from `first` on.
 
         out      array of float32 or float64 to write, of any strides; made if None
         returns  out, [count, dimension], or [count] of masses
