@@ -406,6 +406,31 @@ static ascc_status demand_layer(ascc_network_run *run, int32_t l)
     return status;
 }
 
+/* With a halo: all rows that are computed here, since other processes may read any, and their neighbours. */
+static ascc_status demand_own(ascc_network_run *run)
+{
+    const ascc_network *network = run->network;
+    const ascc_hierarchy *h = run->hierarchy;
+    ascc_status status = ASCC_OK;
+    for (int32_t v = 0; v < network->value_count; v++) {
+        const int32_t set = ascc_network_set(network, v);
+        for (size_t i = 0; i < h->set[set].count; i++)
+            run->value[v].active[i] = set == ASCC_SET_FLUID ? !h->idle[i]
+                                      : set == ASCC_SET_BOUNDARY
+                                          ? 1
+                                          : h->own[set - ASCC_SET_LEVEL + 1][i];
+    }
+    for (int32_t t = 0; t <= run->plan->term_count; t++)
+        for (int i = 0; i < ASCC_MAX_LISTS && status == ASCC_OK && network->term_key[t][i] >= 0;
+             i++) {
+            const int32_t key = network->term_key[t][i], set = network->key[key].query;
+            const uint8_t *own =
+                set == ASCC_SET_FLUID ? run->value[0].active : h->own[set - ASCC_SET_LEVEL + 1];
+            status = ascc_rows_make(&run->rows[key], run->tools, own);
+        }
+    return status;
+}
+
 /* Edges become rows, and flags of the points that they lead to flags of edges. */
 static ascc_status number_edges(ascc_network_run *run)
 {
@@ -456,8 +481,9 @@ ascc_status ascc_network_demand(ascc_network_run *run, const ascc_network *netwo
         return ascc_fail(tools->message, ASCC_ERROR_MEMORY, "no memory for the network");
     ascc_status status = open_rows(run, expected);
     if (status == ASCC_OK)
-        status = demand_output(run);
-    for (int32_t l = network->plan->layer_count - 1; status == ASCC_OK && l >= 0; l--)
+        status = hierarchy->halo ? demand_own(run) : demand_output(run);
+    for (int32_t l = network->plan->layer_count - 1;
+         status == ASCC_OK && l >= 0 && !hierarchy->halo; l--)
         status = demand_layer(run, l);
     for (int i = 0; status == ASCC_OK && i < 2 && network->relaxation_key[i] >= 0; i++)
         status = make_relaxed(run, network->relaxation_key[i]);

@@ -395,6 +395,37 @@ static ascc_status carry_layer(ascc_network_run *run, int32_t l, uint32_t *list)
     return status;
 }
 
+/* ---- What other processes computed ---- */
+
+/* Is the value read through neighbour lists? */
+static bool is_read_around(const ascc_network *network, int32_t v)
+{
+    bool read = false;
+    for (int32_t t = 0; t <= network->plan->term_count; t++)
+        read |= ascc_plan_term(network->plan, t)->source == v && network->term_key[t][0] >= 0;
+    return read;
+}
+
+/* Ghosts of a layer's value, once it is computed. */
+static ascc_status refresh_value(const ascc_network_run *run, int32_t l)
+{
+    const ascc_network *network = run->network;
+    const ascc_value *value = &run->value[l + 2];
+    const size_t size = ascc_padded(ascc_network_channels(network, l + 2)) * sizeof(float);
+    float *const copies[3] = {value->raw, value->rectified, value->drift};
+    ascc_halo_rows arrays[3];
+    size_t count = 0;
+    if (!run->hierarchy->halo || ascc_network_passes_on(network, l) ||
+        !is_read_around(network, l + 2))
+        return ASCC_OK;
+    for (int i = 0; i < 3; i++)
+        if (copies[i])
+            arrays[count++] = (ascc_halo_rows){copies[i], size};
+    memset(value->active, 1,
+           ascc_network_rows(run, run->plan->layer[l].set)); /* all hold numbers now */
+    return ascc_hierarchy_refresh(run->hierarchy, run->plan->layer[l].set, arrays, count);
+}
+
 ascc_status ascc_network_forward(ascc_network_run *run, const float *fluid_features,
                                  const float *boundary_features)
 {
@@ -415,6 +446,8 @@ ascc_status ascc_network_forward(ascc_network_run *run, const float *fluid_featu
         status = compute_layer(run, l, list);
         if (status == ASCC_OK)
             status = carry_layer(run, l, list);
+        if (status == ASCC_OK)
+            status = refresh_value(run, l);
     }
     return status;
 }

@@ -115,6 +115,8 @@ static bool comes_first(const sort_in *job, uint32_t a, uint32_t b)
         order = compare_rows(scene->fluid, d, a, b);
         order = order ? order : compare_rows(scene->velocity, d, a, b);
         order = order ? order : compare_rows(scene->mass, 1, a, b);
+        if (!order && scene->id)
+            return scene->id[a] < scene->id[b];
     } else {
         order = compare_rows(scene->boundary, d, a - fluid, b - fluid);
         order = order ? order : compare_rows(scene->normal, d, a - fluid, b - fluid);
@@ -251,18 +253,58 @@ static ascc_status find_drift(ascc_hierarchy *h, const ascc_search_tools *tools,
     return ASCC_OK;
 }
 
+/* The points of a set without ghosts. */
+static bool lend_own(ascc_points *own, const ascc_hierarchy *h, const ascc_search_tools *tools,
+                     const ascc_points *all)
+{
+    const int32_t set = (int32_t)(all - h->set);
+    const bool room = ascc_points_take(own, tools->arena, all->count);
+    own->count = 0;
+    for (size_t i = 0; room && i < all->count; i++) {
+        const size_t row = ascc_hierarchy_host_row(h, set, i);
+        const int64_t at[3] = {all->position[0][i], all->position[1][i], all->position[2][i]};
+        if (row >= h->fluid_count || !h->halo->ghost[row])
+            ascc_points_set(own, own->count++, at);
+    }
+    return room;
+}
+
+/* Where each row of the host's fluid is in its set. */
+static ascc_status find_halo_rows(ascc_hierarchy *h, const ascc_search_tools *tools)
+{
+    const size_t count = h->set[ASCC_SET_FLUID].count;
+    if (!h->halo)
+        return ASCC_OK;
+    h->halo_row = ascc_arena_take(tools->arena, count, sizeof *h->halo_row);
+    if (!h->halo_row)
+        return ascc_fail(tools->message, ASCC_ERROR_MEMORY, "no memory for %zu rows", count);
+    for (size_t i = 0; i < count; i++)
+        h->halo_row[ascc_hierarchy_host_row(h, ASCC_SET_FLUID, i)] = (uint32_t)i;
+    return ASCC_OK;
+}
+
 static ascc_status build_level(ascc_hierarchy *h, const ascc_search_tools *tools,
                                const ascc_plan *plan, int level)
 {
     const ascc_points *all = &h->set[plan->fluid_sampled ? ASCC_SET_FLUID : ASCC_SET_ALL];
     ascc_points *samples = &h->set[ASCC_SET_LEVEL + level - 1];
     const double voxel = plan->level[level].voxel * h->scale.inverse;
+    ascc_points own;
     if (plan->sampling == ASCC_SAMPLING_FARTHEST)
         return ascc_sample_farthest(samples, tools, all,
                                     (size_t)ceil(plan->level[level].ratio * (double)all->count));
     if (plan->sampling == ASCC_SAMPLING_CENTERS)
         return ascc_sample_centers(samples, tools, all, plan->dimension, voxel);
     double anchor[3] = {0.0, 0.0, 0.0};
+    if (h->halo) {
+        if (!lend_own(&own, h, tools, all))
+            return ascc_fail(tools->message, ASCC_ERROR_MEMORY, "no memory for coarse points");
+        const ascc_status status =
+            ascc_sample_corners(samples, tools, &own, plan->dimension, voxel, 0.0, anchor);
+        return status == ASCC_OK
+                   ? h->halo->corners(h->halo, level, h->scale.unit, tools, samples, &h->own[level])
+                   : status;
+    }
     if (plan->centroid_anchor)
         ascc_centroid(all, anchor);
     return ascc_sample_corners(samples, tools, all, plan->dimension, voxel, plan->hysteresis,
@@ -278,12 +320,15 @@ ascc_status ascc_hierarchy_build(ascc_hierarchy *h, const ascc_search_tools *too
     h->scale = ascc_scale_for_radius(largest);
     h->base_radius = smallest * h->scale.inverse;
     h->fluid_count = scene->fluid_count;
+    h->halo = scene->halo;
     if (scene->fluid_count >= UINT32_MAX ||
         scene->boundary_count >= UINT32_MAX - scene->fluid_count)
         return ascc_fail(tools->message, ASCC_ERROR_RANGE,
                          "%zu fluid and %zu boundary rows are more than 2^32 - 2",
                          scene->fluid_count, scene->boundary_count);
     ascc_status status = build_level_zero(h, tools, plan, scene);
+    if (status == ASCC_OK)
+        status = find_halo_rows(h, tools);
     if (status == ASCC_OK)
         status = find_drift(h, tools, plan, scene);
     if (status == ASCC_OK)

@@ -4,6 +4,7 @@
 #define ASCC_HIERARCHY_H
 
 #include "model/plan.h"
+#include "points/halo.h"
 #include "points/neighbors.h"
 
 #define ASCC_MAX_GRIDS 64
@@ -18,6 +19,9 @@ typedef struct ascc_hierarchy {
     uint32_t *whole[2];  /* and back: [set row] of fluid, boundary */
     int32_t *place[2];   /* low words of fluid, boundary once more: [set row][4], the last 0 */
     const uint8_t *idle; /* rows of fluid whose impulses nobody wants; NULL = none */
+    ascc_halo *halo;     /* of fluid that other processes have, idle here; NULL = they have none */
+    uint32_t *halo_row;  /* with a halo: [host's fluid row] its row of the fluid */
+    const uint8_t *own[ASCC_MAX_LEVELS]; /* with a halo: [rows of level] 1 = computed here */
     float *
         drift; /* motions of walls in spacings a time step, [boundary set row][4]; NULL: all rest */
     struct ascc_sheets
@@ -44,6 +48,8 @@ typedef struct ascc_scene {
     /* Where they are when the step begins, in units of so many metres; NULL: thin walls hide nothing. */
     const double *fluid_before, *boundary_before;
     double unit;
+    ascc_halo *halo;    /* NULL = all fluid is here */
+    const uint64_t *id; /* of fluid, if some of it is not */
 } ascc_scene;
 
 /* Builds all sets the plan uses in the arena. errors: MEMORY, RANGE. */
@@ -70,6 +76,16 @@ static inline bool ascc_hierarchy_is_idle(const ascc_hierarchy *hierarchy, size_
 static inline size_t ascc_hierarchy_wall_row(const ascc_hierarchy *hierarchy, size_t row)
 {
     return ascc_hierarchy_host_row(hierarchy, ASCC_SET_BOUNDARY, row) - hierarchy->fluid_count;
+}
+
+/* Ghosts of a set become what their owners have, in arrays of its rows; nothing without a halo. */
+static inline ascc_status ascc_hierarchy_refresh(const ascc_hierarchy *hierarchy, int32_t set,
+                                                 const ascc_halo_rows *arrays, size_t count)
+{
+    ascc_halo *halo = hierarchy->halo;
+    return halo ? halo->refresh(halo, set, set == ASCC_SET_FLUID ? hierarchy->halo_row : NULL,
+                                arrays, count)
+                : ASCC_OK;
 }
 
 #endif

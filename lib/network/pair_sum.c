@@ -145,20 +145,23 @@ static size_t evaluate_row(ascc_pair_sum *sum, size_t i)
     const ascc_rows *rows = sum->rows;
     const uint32_t *neighbor = rows->neighbor + rows->start[i];
     const size_t count = rows->count[i], first = first_apart(sum, i);
+    const bool elsewhere = sum->run->hierarchy->halo != NULL;
     ascc_pair_batch batch;
-    size_t pairs = 0;
+    size_t pairs = 0, stood = 0;
     batch.count = 0;
     for (size_t k = 0; k < count;) {
         const size_t stop = ascc_min_size(count, k + ASCC_PAIR_BATCH - batch.count);
         for (; k < stop; k++) {
             const uint32_t j = neighbor[k];
+            const bool stands = j < first && sum->idle && stands_in(sum, i, j);
             batch.neighbor[batch.count] = j;
-            batch.count += j >= first || (sum->idle && stands_in(sum, i, j));
+            batch.count += j >= first || stands;
+            stood += stands && elsewhere; /* where the other row is */
         }
         if (batch.count == ASCC_PAIR_BATCH || (k == count && batch.count))
             pairs += flush(sum, i, &batch);
     }
-    return pairs;
+    return pairs - stood;
 }
 
 /* The same of a set with walls, whose pairs with fluid belong to the fluid's row. */
@@ -317,6 +320,7 @@ ascc_status ascc_pair_sum_open(ascc_pair_sum *sum, const ascc_network_run *run, 
                            .skip_coincident = true};
     for (size_t i = 1; i < h->fluid_count; i++)
         sum->uniform &= fluid_mass[i] == fluid_mass[0];
+    sum->uniform = h->halo ? h->halo->uniform : sum->uniform;
     return ASCC_OK;
 }
 

@@ -139,6 +139,13 @@ void ascc_field_store(ascc_particles *particles, ascc_field_index field,
 bool ascc_particles_locate(const ascc_particles *particles, uint64_t id, ascc_kind *kind,
                            size_t *row);
 
+/* ---- snapshot.c ---- */
+
+/* What fluid adds to the hash of a set, rows in any order; and the hash of a set that has so much fluid, some of it
+ * elsewhere. */
+uint64_t ascc_fluid_hash(const ascc_particles *particles);
+uint64_t ascc_whole_hash(const ascc_particles *particles, size_t fluid, uint64_t fluid_hash);
+
 /* ---- momentum.c ---- */
 
 /* Quanta nearest to a momentum; false when not finite or beyond ASCC_MOMENTUM_LIMIT. Rounds to

@@ -504,15 +504,24 @@ static uint64_t sum_bodies(const ascc_particles *particles)
     return sum;
 }
 
+uint64_t ascc_fluid_hash(const ascc_particles *particles)
+{
+    return sum_rows(particles, ASCC_FLUID);
+}
+
+uint64_t ascc_whole_hash(const ascc_particles *particles, size_t fluid, uint64_t fluid_hash)
+{
+    uint64_t hash = mix(0, ascc_particles_width(particles));
+    hash = mix(hash, fluid);
+    hash = mix(hash, particles->boundary_count);
+    hash = mix(hash, ascc_bits_of(particles->quantum));
+    return hash + fluid_hash + sum_rows(particles, ASCC_BOUNDARY) + sum_bodies(particles);
+}
+
 uint64_t ascc_particles_hash(const ascc_particles *particles)
 {
     ASCC_FLOAT_SCOPE;
     if (!ascc_particles_is_set(particles))
         return 0;
-    uint64_t hash = mix(0, ascc_particles_width(particles));
-    hash = mix(hash, particles->fluid_count);
-    hash = mix(hash, particles->boundary_count);
-    hash = mix(hash, ascc_bits_of(particles->quantum));
-    return hash + sum_rows(particles, ASCC_FLUID) + sum_rows(particles, ASCC_BOUNDARY) +
-           sum_bodies(particles);
+    return ascc_whole_hash(particles, particles->fluid_count, ascc_fluid_hash(particles));
 }

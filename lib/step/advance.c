@@ -93,12 +93,23 @@ static ascc_status advance_all(ascc_step_state *state, const int64_t *impulse, b
     return bad ? advance_row(&job, bad - 1, state->tools.message) : ASCC_OK;
 }
 
+ascc_status ascc_advance_refresh(ascc_step_state *state)
+{
+    const size_t size = (size_t)state->particles->dimension * 8;
+    const ascc_halo_rows arrays[] = {{state->advance.position, size},
+                                     {state->advance.momentum, size}};
+    return state->halo ? state->halo->refresh(state->halo, ASCC_SET_FLUID, NULL, arrays, 2)
+                       : ASCC_OK;
+}
+
 ascc_status ascc_stage_advance(ascc_step_state *state)
 {
-    return advance_all(state, state->impulses.fluid, false);
+    const ascc_status status = advance_all(state, state->impulses.fluid, false);
+    return status == ASCC_OK ? ascc_advance_refresh(state) : status;
 }
 
 ascc_status ascc_advance_further(ascc_step_state *state, const int64_t *impulse)
 {
-    return advance_all(state, impulse, true);
+    const ascc_status status = advance_all(state, impulse, true);
+    return status == ASCC_OK ? ascc_advance_refresh(state) : status;
 }

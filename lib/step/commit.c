@@ -87,8 +87,8 @@ static void commit_rows(void *data, size_t begin, size_t end, int32_t slot)
 }
 
 /* Angular impulses of bodies that move, while they are where the step began; `wall` is what rows received since the run
- * began. */
-static void add_torques(ascc_particles *p, const int64_t *wall, bool first)
+ * began, `before` what of it earlier steps gave, or NULL. */
+static void add_torques(ascc_particles *p, const int64_t *wall, const int64_t *before, bool first)
 {
     for (size_t b = 0; b < p->body_count; b++) {
         struct ascc_body *body = &p->bodies[b];
@@ -97,7 +97,7 @@ static void add_torques(ascc_particles *p, const int64_t *wall, bool first)
             memset(body->torque, 0, sizeof body->torque);
         }
         if (body->moved)
-            ascc_body_add_torque(p, body, wall, first ? NULL : p->wall_impulse);
+            ascc_body_add_torque(p, body, wall, before);
     }
 }
 
@@ -113,11 +113,51 @@ static void move_bodies(ascc_particles *p, double seconds)
     }
 }
 
+static bool any_moves(const ascc_particles *p)
+{
+    bool moves = false;
+    for (size_t b = 0; b < p->body_count; b++)
+        moves |= p->bodies[b].moved || ascc_body_moves(&p->bodies[b]);
+    return moves;
+}
+
+/* What walls receive from the fluid of all processes in this step, if somebody asks for it. */
+static ascc_status sum_processes(ascc_step_state *state, int64_t **wall)
+{
+    const ascc_particles *p = state->particles;
+    const size_t count = p->boundary_count * (size_t)p->dimension;
+    *wall = NULL;
+    if (!state->halo || !any_moves(p))
+        return ASCC_OK;
+    int64_t *sum = ascc_arena_lend(state->tools.arena, count, sizeof *sum);
+    ascc_status status = sum ? ASCC_OK
+                             : ascc_fail(state->tools.message, ASCC_ERROR_MEMORY,
+                                         "no memory for the impulses of walls");
+    if (sum)
+        memcpy(sum, state->impulses.wall, count * sizeof *sum);
+    status = state->halo->agree(state->halo, status);
+    if (status == ASCC_OK)
+        status = state->halo->sum(state->halo, (uint64_t *)sum, count);
+    *wall = sum;
+    return status;
+}
+
+/* All that can still fail, here or elsewhere. */
+static ascc_status finish(ascc_step_state *state, bool first, int64_t **all_walls)
+{
+    ascc_status status = sum_processes(state, all_walls);
+    if (status == ASCC_OK && !first)
+        status = sum_walls(state);
+    return state->halo ? state->halo->agree(state->halo, status) : status;
+}
+
 ascc_status ascc_stage_commit(ascc_step_state *state, ascc_particles *p, bool first)
 {
     ascc_workers *workers = state->tools.workers;
     ascc_step_statistics *s = state->statistics;
-    const size_t d = (size_t)p->dimension, n = p->fluid_count, walls = p->boundary_count;
+    const size_t d = (size_t)p->dimension, walls = p->boundary_count;
+    const size_t n = state->halo ? state->halo->own : p->fluid_count;
+    int64_t *all_walls;
     if (first)
         ascc_totals(workers, s->momentum_before, p->momentum, n, d);
     add_totals(workers, s->external_impulse, state->advance.external, n, d);
@@ -127,14 +167,15 @@ ascc_status ascc_stage_commit(ascc_step_state *state, ascc_particles *p, bool fi
     for (size_t c = 0; c < 3; c++)
         s->support_impulse[c] =
             (int64_t)((uint64_t)s->support_impulse[c] + (uint64_t)state->sleep.support[c]);
-    const ascc_status status = first ? ASCC_OK : sum_walls(state);
+    const ascc_status status = finish(state, first, &all_walls);
     if (status != ASCC_OK)
         return status;
     commit_job job = {p, &state->advance};
     ascc_workers_run(workers, n, 8192, commit_rows, &job);
     if (state->sleep.rest)
         memcpy(p->rest, state->sleep.rest, n * sizeof *p->rest);
-    add_torques(p, state->impulses.wall, first);
+    add_torques(p, all_walls ? all_walls : state->impulses.wall,
+                first || all_walls ? NULL : p->wall_impulse, first);
     if (state->advance.walls_move)
         memcpy(p->wall_position, state->advance.wall, walls * d * sizeof(double));
     move_bodies(p, state->motion->time_step);

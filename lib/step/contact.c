@@ -221,14 +221,11 @@ static ascc_status follow_far(near_job *job, size_t count)
     return ascc_contact_far(contact, job->way, row, left);
 }
 
-ascc_status ascc_stage_contact(ascc_step_state *state)
+static ascc_status follow_all(ascc_step_state *state, double distance)
 {
-    const ascc_plan *plan = state->network->plan;
     const ascc_search_tools *tools = &state->tools;
-    const double distance = fmax(plan->output.contact, plan->relaxation.contact);
     const size_t count = state->hierarchy.set[ASCC_SET_FLUID].count;
-    if (!(distance > 0.0) || state->particles->fluid_count == 0 ||
-        state->hierarchy.set[ASCC_SET_BOUNDARY].count == 0)
+    if (count == 0 || state->hierarchy.set[ASCC_SET_BOUNDARY].count == 0)
         return ASCC_OK;
     ascc_contact contact = open_contact(state, distance);
     const ascc_arena_mark mark = ascc_arena_mark_of(tools->arena);
@@ -248,4 +245,14 @@ ascc_status ascc_stage_contact(ascc_step_state *state)
                          "fluid row %zu: a wall gives it a momentum too large to hold",
                          ascc_hierarchy_host_row(&state->hierarchy, ASCC_SET_FLUID, bad - 1));
     return status;
+}
+
+ascc_status ascc_stage_contact(ascc_step_state *state)
+{
+    const ascc_plan *plan = state->network->plan;
+    const double distance = fmax(plan->output.contact, plan->relaxation.contact);
+    if (!(distance > 0.0) || ascc_step_is_empty(state) || state->particles->boundary_count == 0)
+        return ASCC_OK;
+    const ascc_status status = follow_all(state, distance);
+    return status == ASCC_OK ? ascc_advance_refresh(state) : status;
 }

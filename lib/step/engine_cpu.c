@@ -30,6 +30,16 @@ static void tell_gravity(ascc_step_state *state)
                                         (square > 0.0 ? sqrt(square) : 1.0));
 }
 
+/* Points of a level, of which each process tells its own. */
+static size_t points_of(const ascc_hierarchy *h, int32_t level)
+{
+    const size_t count = h->set[ASCC_SET_LEVEL + level - 1].count;
+    size_t own = 0;
+    for (size_t i = 0; h->own[level] && i < count; i++)
+        own += h->own[level][i];
+    return h->own[level] ? own : count;
+}
+
 static void tell(ascc_step_state *state)
 {
     const ascc_hierarchy *h = &state->hierarchy;
@@ -38,7 +48,7 @@ static void tell(ascc_step_state *state)
     s->max_neighbors = state->run.longest;
     s->level_points[0] = h->set[ASCC_SET_ALL].count;
     for (int32_t l = 1; l < state->network->plan->level_count; l++)
-        s->level_points[l] = h->set[ASCC_SET_LEVEL + l - 1].count;
+        s->level_points[l] = points_of(h, l);
 }
 
 ascc_status ascc_engine_cpu(ascc_step_state *state)

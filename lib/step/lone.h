@@ -3,11 +3,12 @@
 #define ASCC_LONE_H
 
 #include "base/context.h"
-#include "points/particles.h"
+#include "points/halo.h"
 
-/* The greatest speed of the fluid without those few particles above `slow` that are farther than `reach` from all
- * others and from walls; `fastest` where there are more than a few. Host's units. */
-double ascc_speed_in_company(ascc_context *context, const ascc_particles *p, double fastest,
-                             double slow, double reach);
+/* *speed, `fastest` of all fluid, becomes the greatest without those few particles above `slow` that are farther than
+ * `reach` from all others and from walls; it stays where there are more than a few. halo: of a part of the fluid,
+ * without ghosts; or NULL. Host's units. errors: those of other processes. */
+ascc_status ascc_speed_in_company(ascc_context *context, const ascc_particles *p, ascc_halo *halo,
+                                  double slow, double reach, double *speed);
 
 #endif

@@ -439,6 +439,19 @@ static void trace_sweep(const relaxation *r, int32_t k)
     memcpy(t->push + 4 * (at - n), r->move, 4 * n * sizeof *t->push);
 }
 
+/* What pairs read of ghosts. */
+static ascc_status refresh_pressure(const relaxation *r)
+{
+    const ascc_halo_rows rows = {r->pressure, sizeof *r->pressure};
+    return ascc_hierarchy_refresh(&r->state->hierarchy, ASCC_SET_FLUID, &rows, 1);
+}
+
+static ascc_status refresh_move(const relaxation *r)
+{
+    const ascc_halo_rows rows = {r->move, 4 * sizeof *r->move};
+    return ascc_hierarchy_refresh(&r->state->hierarchy, ASCC_SET_FLUID, &rows, 1);
+}
+
 /* Everything that sweeps read. slows: of velocities. */
 static ascc_status open_relaxation(relaxation *r, ascc_step_state *state, bool slows)
 {
@@ -476,8 +489,10 @@ static ascc_status open_relaxation(relaxation *r, ascc_step_state *state, bool s
                          " (row %zu): the network takes it too far to relax",
                          state->particles->id[row], row);
     }
-    ascc_workers_run(tools->workers, r->count, ROWS, look_around, r);
-    return r->trace && !begin_trace(r) ? no_memory(state) : ASCC_OK;
+    status = slows ? refresh_move(r) : ASCC_OK;
+    if (status == ASCC_OK)
+        ascc_workers_run(tools->workers, r->count, ROWS, look_around, r);
+    return status == ASCC_OK && r->trace && !begin_trace(r) ? no_memory(state) : status;
 }
 
 /* ---- Sweeps ---- */
@@ -527,26 +542,34 @@ static void begin_rows(void *data, size_t begin, size_t end, int32_t slot)
     }
 }
 
-static void sweep(relaxation *r, const ascc_sweeps *sweeps)
+static ascc_status sweep(relaxation *r, const ascc_sweeps *sweeps)
 {
     ascc_workers *workers = r->state->tools.workers;
-    if (r->guess)
+    ascc_status status = ASCC_OK;
+    if (r->guess) {
         ascc_workers_run(workers, r->count, 16 * ROWS, guess_rows, r);
+        status = refresh_pressure(r);
+    }
     if (r->trace) {
         r->trace->guessed = r->guess != NULL;
         trace_sweep(r, -1);
     }
-    for (int32_t k = 0; k < sweeps->count; k++) {
+    for (int32_t k = 0; k < sweeps->count && status == ASCC_OK; k++) {
         r->omega = (float)sweeps->omega[k];
         if (k > 0 || r->guess) {
             ascc_workers_run(workers, r->count, ROWS, push_rows, r);
+            status = refresh_move(r);
+            if (status != ASCC_OK)
+                return status;
             ascc_workers_run(workers, r->count, ROWS, relax_rows, r);
         } else {
             ascc_workers_run(workers, r->count, 16 * ROWS, begin_rows, r);
         }
         if (r->trace)
             trace_sweep(r, k);
+        status = refresh_pressure(r);
     }
+    return status;
 }
 
 /* ---- Impulses ---- */
@@ -726,13 +749,25 @@ static void measure_rows(void *data, size_t begin, size_t end, int32_t slot)
         ;
 }
 
-static void measure(relaxation *r, ascc_compression *to)
+static ascc_status measure(relaxation *r, ascc_compression *to)
 {
+    ascc_halo *halo = r->state->halo;
+    size_t count = r->count;
     atomic_store(&r->compression, 0);
     atomic_store(&r->largest, 0);
     ascc_workers_run(r->state->tools.workers, r->count, 16 * ROWS, measure_rows, r);
-    to->mean = COMPRESSION_UNIT * (double)atomic_load(&r->compression) / (double)r->count;
-    to->largest = COMPRESSION_UNIT * (double)atomic_load(&r->largest);
+    uint64_t sum = atomic_load(&r->compression), largest = atomic_load(&r->largest);
+    if (halo) {
+        ascc_status status = halo->sum(halo, &sum, 1);
+        if (status == ASCC_OK)
+            status = halo->largest(halo, &largest, 1);
+        if (status != ASCC_OK)
+            return status;
+        count = halo->total;
+    }
+    to->mean = COMPRESSION_UNIT * (double)sum / (double)count;
+    to->largest = COMPRESSION_UNIT * (double)largest;
+    return ASCC_OK;
 }
 
 static int64_t *lend_given(ascc_step_state *state)
@@ -788,13 +823,16 @@ static ascc_status relax(ascc_step_state *state, relaxation *r, int64_t *given,
         r->guessed = state->run.value[r->constants->guess].active;
     }
     memset(r->change, 0, r->count * sizeof *r->change);
-    measure(r, found);
-    if (first)
+    status = measure(r, found);
+    if (status == ASCC_OK && first)
         s->compression_before = *found;
-    sweep(r, &r->constants->pressure);
-    measure(r, &s->compression_after);
+    if (status == ASCC_OK)
+        status = sweep(r, &r->constants->pressure);
+    if (status == ASCC_OK)
+        status = measure(r, &s->compression_after);
     s->sweeps = (uint64_t)(state->relaxed.rounds * r->constants->pressure.count);
-    status = apply(r, given);
+    if (status == ASCC_OK)
+        status = apply(r, given);
     return status == ASCC_OK ? ascc_advance_further(state, given) : status;
 }
 
@@ -814,7 +852,7 @@ static ascc_status run_round(ascc_step_state *state, ascc_compression *found)
 ascc_status ascc_stage_relaxation(ascc_step_state *state)
 {
     const ascc_relaxation *constants = &state->network->plan->relaxation;
-    if (!constants->pressure.count || !state->particles->fluid_count)
+    if (!constants->pressure.count || ascc_step_is_empty(state))
         return ASCC_OK;
     ascc_compression found;
     ascc_status status = run_round(state, &found);
@@ -834,8 +872,9 @@ static ascc_status slow_down(ascc_step_state *state, relaxation *r, int64_t *giv
     ascc_status status = given ? open_relaxation(r, state, true) : no_memory(state);
     if (status != ASCC_OK)
         return status;
-    sweep(r, &r->constants->divergence);
-    status = apply(r, given);
+    status = sweep(r, &r->constants->divergence);
+    if (status == ASCC_OK)
+        status = apply(r, given);
     for (size_t k = 0; status == ASCC_OK && k < p->fluid_count * (size_t)p->dimension; k++)
         if (__builtin_add_overflow(state->advance.momentum[k], given[k],
                                    &state->advance.momentum[k]) ||
@@ -849,7 +888,7 @@ static ascc_status slow_down(ascc_step_state *state, relaxation *r, int64_t *giv
 
 ascc_status ascc_stage_divergence(ascc_step_state *state)
 {
-    if (!state->network->plan->relaxation.divergence.count || !state->particles->fluid_count)
+    if (!state->network->plan->relaxation.divergence.count || ascc_step_is_empty(state))
         return ASCC_OK;
     const ascc_arena_mark mark = ascc_arena_mark_of(state->tools.arena);
     relaxation r;

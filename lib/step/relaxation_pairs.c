@@ -3,6 +3,8 @@
  * SPDX-License-Identifier: MIT */
 #include "relaxation_pairs.h"
 
+#include <math.h>
+
 #include "points/search.h"
 
 /* Positions of fluid rows as they are now, host's units. */
@@ -51,6 +53,26 @@ static ascc_status find(ascc_step_state *state, const double *fluid, const doubl
     return ascc_search_run(search, &state->tools, &options);
 }
 
+/* Ghosts are all that a list needs while no fluid has gone farther than they serve. */
+static ascc_status check_reached(const ascc_step_state *state, const double *fluid)
+{
+    const ascc_hierarchy *h = &state->hierarchy;
+    const ascc_points *seen = &h->set[ASCC_SET_FLUID];
+    const size_t d = (size_t)state->particles->dimension;
+    const double unit = h->scale.unit / state->length_unit;
+    double farthest = 0.0;
+    if (!state->halo)
+        return ASCC_OK;
+    for (size_t i = 0; i < seen->count; i++)
+        for (size_t c = 0; c < d && !ascc_hierarchy_is_idle(h, i); c++)
+            farthest = fmax(farthest, fabs(fluid[i * d + c] - unit * (double)seen->position[c][i]));
+    const ascc_status status = ascc_halo_largest(state->halo, &farthest);
+    if (status != ASCC_OK || farthest <= state->halo->reached)
+        return status;
+    state->halo->widen(state->halo, farthest);
+    return ascc_fail(state->tools.message, ASCC_ERROR_LIMIT, "ghosts do not reach so far");
+}
+
 ascc_status ascc_relaxation_pairs_find(ascc_step_state *state, const ascc_rows *rows[2])
 {
     const ascc_arena_mark mark = ascc_arena_mark_of(state->tools.arena);
@@ -60,6 +82,8 @@ ascc_status ascc_relaxation_pairs_find(ascc_step_state *state, const ascc_rows *
     if (!fluid || !walls)
         (void)ascc_fail(state->tools.message, status, "no memory for the relaxation");
     else
+        status = check_reached(state, fluid);
+    if (status == ASCC_OK)
         status = find(state, fluid, NULL, &rows[0]);
     if (status == ASCC_OK)
         status = find(state, fluid, walls, &rows[1]);

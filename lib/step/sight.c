@@ -138,7 +138,9 @@ ascc_status ascc_stage_sight(ascc_step_state *state)
                         .motion = motion_factor(state),
                         .fluid_before = p->position,
                         .boundary_before = p->wall_position,
-                        .unit = state->length_unit};
+                        .unit = state->length_unit,
+                        .halo = state->halo,
+                        .id = state->halo ? p->id : NULL};
     ascc_status status = find_areas(state);
     if (status != ASCC_OK)
         return status;

@@ -309,7 +309,9 @@ ascc_status ascc_stage_sleep(ascc_step_state *state)
 {
     const size_t n = state->particles->fluid_count;
     const double fall = state->motion->time_step * length_of(state->motion->gravity);
-    if (!(state->motion->sleep_speed * fall > 0.0) || n == 0)
+    if (state->halo) /* ghosts are idle: what they do is computed elsewhere */
+        state->sleep.idle = state->halo->ghost;
+    if (state->halo || !(state->motion->sleep_speed * fall > 0.0) || n == 0)
         return wake_all(state);
     ascc_arena *arena = state->tools.arena;
     judgement *j = state->sleep.blocks = ascc_arena_take(arena, 1, sizeof *j);

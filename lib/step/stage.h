@@ -84,6 +84,7 @@ typedef struct ascc_step_state {
     const ascc_network *network;
     const ascc_particles *particles;
     const ascc_motion *motion;
+    ascc_halo *halo;               /* fluid of other processes; NULL = there is none */
     ascc_turn turn;                /* of all that stages see, from the host's axes */
     double length_unit, time_unit; /* m and s of the model in the host's unit and second */
     size_t *expected;              /* of the network's neighbour lists */
@@ -122,6 +123,15 @@ static inline const double *ascc_walls_seen(const ascc_step_state *state)
 
 /* What walls stand for where they end: state->wall_volume. errors: MEMORY, RANGE, LIMIT. */
 ascc_status ascc_find_wall_volumes(ascc_step_state *state, double support);
+
+/* Is there no fluid, here or anywhere else? */
+static inline bool ascc_step_is_empty(const ascc_step_state *state)
+{
+    return (state->halo ? state->halo->total : state->particles->fluid_count) == 0;
+}
+
+/* Positions and momenta of ghosts, as their owners have them now. errors: those of any process. */
+ascc_status ascc_advance_refresh(ascc_step_state *state);
 
 typedef ascc_status (*ascc_stage)(ascc_step_state *state);
 

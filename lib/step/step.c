@@ -182,7 +182,7 @@ void ascc_stage_lap(ascc_step_state *state, const char *name)
 /* Without fluid there is nothing to see. */
 static ascc_status run_engine(ascc_step_state *state)
 {
-    return state->particles->fluid_count ? state->engine(state) : ASCC_OK;
+    return ascc_step_is_empty(state) ? ASCC_OK : state->engine(state);
 }
 
 /* What a step is, but for the last stage, which alone changes the particles. */
@@ -272,6 +272,7 @@ ascc_status ascc_step_once(ascc_step *step, ascc_particles *p, const ascc_motion
         .network = &step->network,
         .particles = p,
         .motion = motion,
+        .halo = step->halo,
         .turn = step->turn,
         .length_unit = step->model_length,
         .time_unit = step->model_time,
@@ -287,6 +288,8 @@ ascc_status ascc_step_once(ascc_step *step, ascc_particles *p, const ascc_motion
         status = ascc_turns(&state->turn) ? run_turned(step, p, state) : run_stages(state);
     if (status == ASCC_OK)
         status = ascc_stage_commit(state, p, first);
+    else if (step->halo)
+        status = step->halo->agree(step->halo, status);
     ascc_stage_lap(state, "commit");
     step->statistics.seconds_total += state->since - begin;
     step->statistics.scratch_size = ascc_arena_size(arena);
@@ -401,28 +404,70 @@ static double most_displacement(const ascc_step *step, const ascc_particles *p)
     return given ? step->max_displacement : DEFAULT_DISPLACEMENT * p->spacing;
 }
 
+/* A step among processes: with ghosts while it lasts, and once more where they did not reach. */
+static ascc_status run_with_ghosts(ascc_step *step, ascc_particles *p, ascc_motion *motion,
+                                   bool first, ascc_step_state *state)
+{
+    ascc_halo *halo = step->halo;
+    double reached;
+    ascc_status status;
+    do {
+        const ascc_step_statistics before = step->statistics;
+        reached = halo->reached;
+        status = halo->begin(halo, step, p, motion);
+        if (status == ASCC_OK)
+            status = ascc_step_once(step, p, motion, first, &step->arena, state);
+        halo->end(halo, p);
+        if (status != ASCC_OK && halo->reached > reached)
+            step->statistics = before;
+    } while (status != ASCC_OK && halo->reached > reached);
+    return status;
+}
+
+static bool keep_all(ascc_step *step, const ascc_particles *p)
+{
+    return step->halo ? step->halo->keep(step->halo, p) : keep(step, p);
+}
+
+static void take_all_back(const ascc_step *step, ascc_particles *p)
+{
+    if (step->halo)
+        step->halo->take_back(step->halo, p);
+    else
+        take_back(step, p);
+}
+
+/* Into how many steps, and memory for all of them. */
+static ascc_status prepare(ascc_step *step, ascc_particles *p, const ascc_motion *motion,
+                           int32_t *count)
+{
+    ascc_status status = ascc_count_substeps(step, p, motion, count);
+    if (status == ASCC_OK)
+        status = remember(step, p);
+    if (status == ASCC_OK && *count > 1 && !keep_all(step, p))
+        status = ascc_fail(&step->message, ASCC_ERROR_MEMORY, "no memory to keep %zu particles",
+                           p->fluid_count);
+    return step->halo ? step->halo->agree(step->halo, status) : status;
+}
+
 /* One time step of the host's: all of its substeps, or none. */
 static ascc_status run_once(ascc_step *step, ascc_particles *p, ascc_motion *motion)
 {
     ascc_step_state state;
     int32_t count;
-    ascc_status status = ascc_count_substeps(step, p, motion, &count);
+    ascc_status status = prepare(step, p, motion, &count);
     if (status != ASCC_OK)
         return status;
     motion->time_step = step->time_step / count;
     const bool first = step->statistics.steps == 0 && !step->continues;
-    status = remember(step, p);
-    if (status != ASCC_OK)
-        return status;
-    if (count > 1 && !keep(step, p))
-        return ascc_fail(&step->message, ASCC_ERROR_MEMORY, "no memory to keep %zu particles",
-                         p->fluid_count);
     const ascc_step_statistics before = step->statistics;
     step->statistics.substeps = count;
     for (int32_t n = 0; n < count && status == ASCC_OK; n++, step->statistics.substeps_total++) {
-        status = ascc_step_once(step, p, motion, first && n == 0, &step->arena, &state);
+        status = step->halo
+                     ? run_with_ghosts(step, p, motion, first && n == 0, &state)
+                     : ascc_step_once(step, p, motion, first && n == 0, &step->arena, &state);
         if (status != ASCC_OK && n > 0)
-            take_back(step, p);
+            take_all_back(step, p);
     }
     if (status != ASCC_OK)
         step->statistics = before;
@@ -454,6 +499,8 @@ ascc_status ascc_step_run(ascc_step *step, ascc_particles *particles, const ascc
                     particles->fluid_count, (size_t)particles->dimension);
         memcpy(s->momentum_after, s->momentum_before, sizeof s->momentum_after);
     }
+    if (step->halo)
+        status = step->halo->agree(step->halo, status);
     for (int32_t n = 0; status == ASCC_OK && n < count; n++) {
         status = run_once(step, particles, &motion);
         if (status == ASCC_OK)

@@ -24,8 +24,9 @@ struct ascc_step {
     size_t acceleration_capacity;
     unsigned char *kept; /* the state before the first of several substeps */
     size_t kept_capacity;
-    ascc_turn turn; /* of the run under way; none for a trainer's steps */
-    bool continues; /* the next run adds to impulses of walls that another step's began */
+    ascc_turn turn;  /* of the run under way; none for a trainer's steps */
+    ascc_halo *halo; /* of the run under way: fluid of other processes; NULL = there is none */
+    bool continues;  /* the next run adds to impulses of walls that another step's began */
     ascc_step_statistics statistics;
     ascc_message message;
 };

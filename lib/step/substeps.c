@@ -101,16 +101,24 @@ static bool is_too_far(const ascc_motion *motion, double way)
 }
 
 /* Of the fluid: a particle too fast for a whole step counts where it may meet another. */
-static double speed_that_counts(const ascc_step *step, const ascc_particles *p, double fastest,
-                                double push)
+static ascc_status find_speed_that_counts(const ascc_step *step, const ascc_particles *p,
+                                          double push, double *fastest)
 {
     const ascc_plan *plan = &step->model->plan;
     const double dt = step->time_step, slow = p->spacing * plan->way_max / dt - push * dt;
-    if (!(fastest > slow) || isinf(fastest))
-        return fastest;
-    const double way = (fastest + push * dt) * dt;
-    return ascc_speed_in_company(step->context, p, fastest, slow,
-                                 ascc_plan_receptive_radius(plan) / step->model_length + 2.0 * way);
+    if (!(*fastest > slow) || isinf(*fastest))
+        return ASCC_OK;
+    const double way = (*fastest + push * dt) * dt;
+    return ascc_speed_in_company(step->context, p, step->halo, slow,
+                                 ascc_plan_receptive_radius(plan) / step->model_length + 2.0 * way,
+                                 fastest);
+}
+
+/* Of the fluid of all processes. */
+static ascc_status join_extremes(ascc_halo *halo, double *speed, double *push)
+{
+    const ascc_status status = ascc_halo_largest(halo, speed);
+    return status == ASCC_OK ? ascc_halo_largest(halo, push) : status;
 }
 
 ascc_status ascc_count_substeps(ascc_step *step, const ascc_particles *p, const ascc_motion *motion,
@@ -125,10 +133,15 @@ ascc_status ascc_count_substeps(ascc_step *step, const ascc_particles *p, const 
         return ASCC_OK;
     ascc_workers_run(step->context->workers, p->fluid_count, 8192, look_at_fluid, &job);
     ascc_workers_run(step->context->workers, p->boundary_count, 8192, look_at_walls, &job);
-    const double push = sqrt(square_of(motion->gravity, 3)) + root_of(&job.push);
+    double speed = root_of(&job.speed), pushed = root_of(&job.push);
+    ascc_status status = step->halo ? join_extremes(step->halo, &speed, &pushed) : ASCC_OK;
+    const double push = sqrt(square_of(motion->gravity, 3)) + pushed;
     const double gravity = push * dt * dt / h;
-    const double speed =
-        fmax(speed_that_counts(step, p, root_of(&job.speed), push), root_of(&job.wall_speed));
+    if (status == ASCC_OK)
+        status = find_speed_that_counts(step, p, push, &speed);
+    if (status != ASCC_OK)
+        return status;
+    speed = fmax(speed, root_of(&job.wall_speed));
     double steps = steps_for(dt * step->model_time / plan->time_step_max);
     if (!is_too_far(motion, (speed + push * dt / steps) * dt / steps)) {
         steps = fmax(steps, steps_for(sqrt(gravity / plan->gravity_max)));

@@ -1,0 +1,77 @@
+/* What a step asks of other processes that hold the rest of its fluid. SPDX-License-Identifier: MIT
+ *
+ * A process has fluid of its own and copies of all that its own can see, ghosts, which belong to others:
+ *
+ *     host's rows   [ own | ghosts ]        own: computed here          ghosts: read here, and
+ *     coarse rows   in one order, marked                                refreshed from their owners
+ *
+ * A row of its own has all of its neighbours here, in the one order that follows from positions, so that its sums
+ * are those of a single process. Whatever is read through neighbours is refreshed once it has been computed. All
+ * processes make the same calls in the same order: whether one is made follows from what all of them know.
+ */
+#ifndef ASCC_HALO_H
+#define ASCC_HALO_H
+
+#include <string.h>
+
+#include "extent.h"
+#include "particles.h"
+
+struct ascc_step;
+struct ascc_motion;
+
+/* Rows of `size` bytes. */
+typedef struct ascc_halo_rows {
+    void *rows;
+    size_t size;
+} ascc_halo_rows;
+
+typedef struct ascc_halo ascc_halo;
+
+struct ascc_halo {
+    size_t own;           /* fluid rows that are not ghosts */
+    size_t total;         /* fluid of all processes */
+    const uint8_t *ghost; /* [fluid rows] */
+    bool uniform;         /* all fluid of all processes has one mass */
+    double reached; /* host's unit: the farthest that ghosts serve from where they were seen */
+
+    /* Makes ghosts for a step of this length, and drops them again. Fluid may change its owner. errors: MEMORY. */
+    ascc_status (*begin)(ascc_halo *halo, struct ascc_step *step, ascc_particles *particles,
+                         struct ascc_motion *motion);
+    void (*end)(ascc_halo *halo, ascc_particles *particles);
+    /* Ghosts that serve at least so far from now on. */
+    void (*widen)(ascc_halo *halo, double reached);
+    /* The state before the first of several substeps, and back to it. */
+    bool (*keep)(ascc_halo *halo, const ascc_particles *particles);
+    void (*take_back)(ascc_halo *halo, ascc_particles *particles);
+
+    /* OK if all processes say so. After a failure of any, nobody waits for another in this run. */
+    ascc_status (*agree)(ascc_halo *halo, ascc_status own);
+    /* Ghosts become what their owners have, in `count` arrays of rows. set: fluid or a level. row: of each host's row
+     * of the fluid its row in the arrays; NULL = the same, as of levels always. errors: those of any process. */
+    ascc_status (*refresh)(ascc_halo *halo, int set, const uint32_t *row,
+                           const ascc_halo_rows *arrays, size_t count);
+    /* The corners of a level that this process needs, of those that it and the others found, in the order of
+     * samples; which are its own. unit: m of a unit. errors: MEMORY. */
+    ascc_status (*corners)(ascc_halo *halo, int level, double unit, const ascc_search_tools *tools,
+                           ascc_points *samples, const uint8_t **own);
+    /* Over all processes: the largest of numbers, and sums that wrap. errors: those of any process. */
+    ascc_status (*largest)(ascc_halo *halo, uint64_t *numbers, size_t count);
+    ascc_status (*sum)(ascc_halo *halo, uint64_t *numbers, size_t count);
+    /* The numbers of all processes one after another, where they are at most `most`, and where those of this one
+     * begin; always how many there are. errors: those of any process. */
+    ascc_status (*join)(ascc_halo *halo, uint64_t *numbers, size_t most, size_t *count,
+                        size_t *first);
+};
+
+/* The largest of a number >= 0 over all processes: their bits are in the order of the numbers. */
+static inline ascc_status ascc_halo_largest(ascc_halo *halo, double *number)
+{
+    uint64_t bits;
+    memcpy(&bits, number, sizeof bits);
+    const ascc_status status = halo->largest(halo, &bits, 1);
+    memcpy(number, &bits, sizeof bits);
+    return status;
+}
+
+#endif
