@@ -87,6 +87,7 @@ static ascc_status make(const ascc_context_options *options, ascc_context **cont
                          (long)threads);
     }
     made->magic = ASCC_CONTEXT_MAGIC;
+    made->version = ASCC_CONTEXT_VERSION;
     *context = made;
     return ASCC_OK;
 }

@@ -9,6 +9,8 @@
 
 struct ascc_context {
     uint32_t magic; /* ASCC_CONTEXT_MAGIC while alive */
+    uint32_t
+        version; /* ASCC_CONTEXT_VERSION of the library that made it: others that share handles compare it */
     ascc_allocator allocator;
     void (*log)(void *user, const char *line);
     void *user;
@@ -18,6 +20,8 @@ struct ascc_context {
     struct ascc_context_shared *shared; /* reference count, lock and last message */
 };
 
+#define ASCC_CONTEXT_VERSION                                                                       \
+    ((uint32_t)ASCC_VERSION_MAJOR << 24 | (uint32_t)ASCC_VERSION_MINOR << 12 | ASCC_VERSION_PATCH)
 #define ASCC_CONTEXT_MAGIC 0x43435341u   /* "ASCC" */
 #define ASCC_MODEL_MAGIC 0x4d435341u     /* "ASCM" */
 #define ASCC_PARTICLES_MAGIC 0x50435341u /* "ASCP" */
