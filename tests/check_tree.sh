@@ -46,7 +46,7 @@ awk '
 grep -v '<' "$scratch/includes" >"$scratch/graph"
 
 check 'a folder of lib includes itself and lower ones' "$(awk '
-    BEGIN { n = split("kernels base file points model network step train", order, " ")
+    BEGIN { n = split("kernels base file points model network step train mpi", order, " ")
             for (i = 1; i <= n; i++) level["lib/" order[i]] = i }
     function folder(f) { sub(/\/[^\/]*$/, "", f); return f }
     { from = folder($1); to = folder($2) }
@@ -60,7 +60,7 @@ libc='assert|errno|fcntl|fenv|float|immintrin|inttypes|limits|malloc|math|pthrea
 libc="$libc|stddef|stdint|stdio|stdlib|string|sys/stat|time|unistd|windows|arm_neon|sched|threads|wasm_simd128"
 check 'lib includes nothing but itself, the public headers and libc' "$(
     grep 'missing:' "$scratch/includes" | sed 's/missing:/"/; s/$/"/'
-    grep '<' "$scratch/includes" | grep -vE " <($libc)\.h>$| <ascc/(ascc|version)\.h>$|^lib/train/.* <ascc/train\.h>$"
+    grep '<' "$scratch/includes" | grep -vE " <($libc)\.h>$| <ascc/(ascc|version)\.h>$|^lib/train/.* <ascc/train\.h>$|^lib/mpi/.* <(ascc/)?mpi\.h>$"
     grep '^lib/kernels/.*<ascc/' "$scratch/includes" | grep -v '^lib/kernels/select\.c ')"
 
 # ---- Programs ----
@@ -134,11 +134,12 @@ plain="$plain|particles_(get_asleep|wake)"
 plain="$plain|ladder_(step|step_count|get_choices|snapshot_size)"
 plain="$plain|particles_(total_momentum|get_(ids|bodies|momentum))"
 plain="$plain|body_remove|bodies_list"
+plain="$plain|mpi_particles_(local|destroy|message|count|total_momentum|get_statistics)"
 awk '/^[a-z].*[ *]ascc_[a-z_]+\(/ && !/;/ { sub(/\(.*/, ""); sub(/.*[ *]/, ""); name = $0 }
     body { if (/ASCC_FLOAT_SCOPE;/) print name }
     { body = /^\{/ }' $lib >"$scratch/scopes"
 check 'every public function with floating point begins with ASCC_FLOAT_SCOPE' "$(
-    sed -n 's/^ASCC_API.*[ *]\(ascc_[a-z_]*\)(.*/\1/p' include/ascc/ascc.h include/ascc/train.h |
+    sed -n 's/^ASCC_API.*[ *]\(ascc_[a-z_]*\)(.*/\1/p' include/ascc/ascc.h include/ascc/train.h include/ascc/mpi.h |
         grep -vE "^ascc_($plain)\$" | grep -vxFf "$scratch/scopes")"
 
 # ---- Symbols ----

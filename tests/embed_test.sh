@@ -149,7 +149,7 @@ subproject() {
     env PKG_CONFIG_PATH= PKG_CONFIG_LIBDIR="$folder/none" meson setup "$folder/game/build" "$folder/game" "$@"
 }
 targets() { meson introspect --targets "$folder/game/build" | tr ',' '\n' | sed -n 's/^ *{*\[*{*"name": "\(.*\)"/\1/p'; }
-only_libraries() { targets | grep -qx hello && ! targets | grep -vE '^(hello|learn|ascc(-train)?(-(core|hot|avx2|avx512|neon))?)$'; }
+only_libraries() { targets | grep -qx hello && ! targets | grep -vE '^(hello|learn|ascc(-train|-mpi)?(-(core|hot|avx2|avx512|neon))?)$'; }
 check 'a Meson project has it as a subproject, without packages' subproject --buildtype=debug
 check 'no examples, tests and benchmarks come along' only_libraries
 if [ -n "${ASCC_TEST_LONG:-}" ]; then

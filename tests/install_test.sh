@@ -11,7 +11,7 @@ install_it() {
     prefix=$(meson introspect --buildoptions "$build" |
         sed 's/.*"name": "prefix", "value": "\([^"]*\)".*/\1/')
     mv "$folder$prefix" "$folder/root" && pc=$(find "$folder/root" -name ascc.pc) && [ -n "$pc" ] &&
-        sed -i "s|^prefix=.*|prefix=$folder/root|" "$pc" "$(dirname "$pc")/ascc-train.pc" && libdir=$(dirname "$pc")/..
+        sed -i "s|^prefix=.*|prefix=$folder/root|" "$pc" "$(dirname "$pc")"/ascc-[mt]*.pc && libdir=$(dirname "$pc")/..
 }
 check 'it installs' install_it
 libdir=$(cd "$libdir" && pwd)
@@ -82,6 +82,14 @@ trainer() {
     ! nm -D --defined-only "$libdir/libascc-train.so" | awk '{ print $3 }' | grep -vE '^ascc_train(er)?_'
 }
 check 'libascc-train exports ascc_train_* and ascc_trainer_* alone' trainer
+if [ -e "$libdir/libascc-mpi.so" ]; then
+    distributed() {
+        nm -D --defined-only "$libdir/libascc-mpi.so" | awk '{ print $3 }' | sort >"$folder/exported"
+        sed -n 's/^ASCC_API.*[ *]\(ascc_mpi_[a-z_]*\)(.*/\1/p' include/ascc/mpi.h | sort | diff - "$folder/exported"
+    }
+    check 'libascc-mpi exports what its header declares, and no more' distributed
+    check 'ascc-mpi.pc asks for libascc of its version' pkg-config --print-requires ascc-mpi
+fi
 exports() { nm -D --defined-only "$library" | awk '{ print $3 }' | LC_ALL=C sort | diff - tests/exports.txt; }
 check 'it exports what tests/exports.txt lists' exports
 only_ours() { ! nm -D --defined-only "$library" | awk '{ print $3 }' | grep -v '^ascc_'; }

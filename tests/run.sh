@@ -121,6 +121,7 @@ tests/stability_test.sh build-release
 tests/convert_test.sh build-release
 tests/export_test.sh build-release
 tests/hosts_test.sh build-release
+tests/mpi_test.sh build-release
 tests/bench_test.sh build-release
 tests/docs_test.sh build-release
 tests/view_test.sh build-release

@@ -53,5 +53,6 @@ setup_cross() {
     setup_optional sdl2-config libsdl2-dev # ascc view
     setup_optional Xvfb xvfb               # tests/view_test.sh
     pkg-config --exists box2d bullet || setup_optional box2d-and-bullet libbox2d-dev libbullet-dev # tests/hosts_test.sh
+    mpicc --version >/dev/null 2>&1 || setup_optional no-mpicc libopenmpi-dev openmpi-bin # tests/mpi_test.sh
     return 0
 }

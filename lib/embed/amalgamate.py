@@ -202,7 +202,7 @@ class Amalgamation:
             for n in private_names((LIB / name).read_text()):
                 count[n] = count.get(n, 0) + 1
         for header in LIB.rglob("*.h"):
-            if header.name not in ("body.h", "vector.h"):
+            if header.name not in ("body.h", "vector.h") and header.parent.name != "mpi":
                 for n in private_names(header.read_text()):
                     count[n] = count.get(n, 0) + 2
         self.shared = {n for n, times in count.items() if times > 1}

@@ -1,0 +1,116 @@
+/* Blocks, their order and their owners. SPDX-License-Identifier: MIT */
+#include "curve.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#define BITS 21 /* of a coordinate */
+#define HALF ((int64_t)1 << (BITS - 1))
+
+void ascc_curve_block(const ascc_curve *curve, const double *place, int64_t block[3])
+{
+    for (int32_t c = 0; c < 3; c++) {
+        const double b = c < curve->dimension ? floor(place[c] / curve->edge) : 0.0;
+        block[c] = b < (double)-HALF ? -HALF : b < (double)HALF ? (int64_t)b : HALF - 1;
+    }
+}
+
+/* Two zeros before each of 21 bits. */
+static uint64_t spread(uint64_t x)
+{
+    x = (x | x << 32) & UINT64_C(0x001f00000000ffff);
+    x = (x | x << 16) & UINT64_C(0x001f0000ff0000ff);
+    x = (x | x << 8) & UINT64_C(0x100f00f00f00f00f);
+    x = (x | x << 4) & UINT64_C(0x10c30c30c30c30c3);
+    return (x | x << 2) & UINT64_C(0x1249249249249249);
+}
+
+uint64_t ascc_curve_key(const ascc_curve *curve, const int64_t block[3])
+{
+    uint64_t key = 0;
+    for (int c = 0; c < curve->dimension; c++)
+        key |= spread((uint64_t)(block[c] + HALF)) << c;
+    return key;
+}
+
+int ascc_curve_owner(const ascc_curve *curve, const int64_t block[3])
+{
+    const uint64_t key = ascc_curve_key(curve, block);
+    int low = 0, high = curve->size; /* the owner is in [low, high) */
+    while (high - low > 1) {
+        const int middle = low + (high - low) / 2;
+        if (curve->first[middle] <= key)
+            low = middle;
+        else
+            high = middle;
+    }
+    return low;
+}
+
+int ascc_curve_owner_of(const ascc_curve *curve, const double *place)
+{
+    int64_t block[3];
+    ascc_curve_block(curve, place, block);
+    return ascc_curve_owner(curve, block);
+}
+
+static void add_owner(ascc_owners *owners, int rank)
+{
+    if (!owners->is[rank])
+        owners->rank[owners->count++] = rank;
+    owners->is[rank] = 1;
+}
+
+void ascc_owners_find(ascc_owners *owners, const ascc_curve *curve, const double *place,
+                      double reach)
+{
+    int64_t low[3], high[3], at[3];
+    double from[3] = {0.0, 0.0, 0.0}, to[3] = {0.0, 0.0, 0.0};
+    for (int32_t c = 0; c < curve->dimension; c++) {
+        from[c] = place[c] - reach;
+        to[c] = place[c] + reach;
+    }
+    ascc_curve_block(curve, from, low);
+    ascc_curve_block(curve, to, high);
+    if (owners->known && memcmp(low, owners->low, sizeof low) == 0 &&
+        memcmp(high, owners->high, sizeof high) == 0)
+        return; /* places follow one another mostly in one block */
+    memcpy(owners->low, low, sizeof low);
+    memcpy(owners->high, high, sizeof high);
+    owners->known = true;
+    owners->count = 0;
+    memset(owners->is, 0, (size_t)curve->size);
+    for (at[2] = low[2]; at[2] <= high[2]; at[2]++)
+        for (at[1] = low[1]; at[1] <= high[1]; at[1]++)
+            for (at[0] = low[0]; at[0] <= high[0]; at[0]++)
+                add_owner(owners, ascc_curve_owner(curve, at));
+}
+
+static int by_key(const void *a, const void *b)
+{
+    const ascc_load *x = a, *y = b;
+    return x->key < y->key ? -1 : x->key > y->key;
+}
+
+void ascc_curve_cut(ascc_curve *curve, ascc_load *load, size_t count)
+{
+    uint64_t total = 0, before = 0;
+    int rank = 1;
+    qsort(load, count, sizeof *load, by_key);
+    for (size_t i = 0; i < count; i++)
+        total += load[i].count;
+    for (size_t i = 0, next; i < count; i = next) {
+        uint64_t here = 0;
+        for (next = i; next < count && load[next].key == load[i].key; next++)
+            here += load[next].count;
+        /* A cut comes before the block whose middle lies behind it. */
+        while (rank < curve->size && (double)before + 0.5 * (double)here >=
+                                         (double)total * (double)rank / (double)curve->size)
+            curve->first[rank++] = load[i].key;
+        before += here;
+    }
+    while (rank < curve->size)
+        curve->first[rank++] = UINT64_MAX;
+    curve->first[0] = 0;
+}

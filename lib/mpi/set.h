@@ -1,0 +1,137 @@
+/* The distributed particle set, and what its parts share. SPDX-License-Identifier: MIT */
+#ifndef ASCC_MPI_SET_H
+#define ASCC_MPI_SET_H
+
+#include <mpi.h>
+
+#include <ascc/mpi.h>
+
+#include "curve.h"
+#include "points/halo.h"
+#include "step/step.h"
+
+/* An array that grows. */
+typedef struct ascc_mpi_array {
+    void *at;
+    size_t capacity, element;
+} ascc_mpi_array;
+
+/* Rows for each process, or of each. */
+typedef struct ascc_mpi_lists {
+    ascc_mpi_array row; /* uint32_t */
+    size_t *start;      /* [size + 1] */
+} ascc_mpi_lists;
+
+/* Ghosts of one point set: fluid, or a level. */
+typedef struct ascc_mpi_ghosts {
+    ascc_mpi_lists send, receive;
+} ascc_mpi_ghosts;
+
+/* A row and a process that it goes to. */
+typedef struct ascc_mpi_pair {
+    uint32_t rank, row;
+} ascc_mpi_pair;
+
+struct ascc_mpi_particles {
+    uint32_t magic;
+    ascc_halo halo;
+    MPI_Comm comm; /* the set's own */
+    int rank, size;
+    ascc_context *context; /* retained */
+    ascc_particles
+        *local; /* walls and bodies of all, fluid of this process; ghosts while a step lasts */
+    ascc_curve curve;
+    ascc_owners owners;
+    bool cut;                                /* the curve is cut by what fluid there is */
+    uint64_t age;                            /* steps since the last look at the balance */
+    ascc_mpi_ghosts ghosts[ASCC_MAX_LEVELS]; /* fluid, then levels by number */
+    double reach[ASCC_MAX_LEVELS];           /* host's unit: how far a row of the set is read */
+    double relaxed;       /* likewise, from where fluid is when it is searched again; or 0 */
+    ascc_mpi_array flags; /* uint8_t: ghosts among fluid rows */
+    ascc_mpi_array pairs, outgoing, incoming, loads, kept, sums, pending;
+    size_t kept_size;
+    size_t *counts; /* [4][size] */
+    uint64_t *told; /* [2][size] */
+    /* Of the step under way: */
+    struct ascc_step *step;
+    const ascc_motion *motion;
+    bool accelerates; /* some process has given an acceleration */
+    bool stopped;     /* a process has failed */
+    bool by_other;    /* and this one has not */
+    ascc_mpi_statistics statistics;
+    ascc_message message;
+};
+
+#define ASCC_MPI_ALIKE 24          /* words that ascc_mpi_alike compares, at most */
+#define ASCC_MPI_EDGE 8.0          /* of a block, spacings */
+#define ASCC_MPI_MAGIC 0x49435341u /* "ASCI" */
+
+bool ascc_mpi_room(ascc_mpi_particles *set, ascc_mpi_array *array, size_t count, size_t element);
+
+/* ---- particles.c ---- */
+
+static inline bool ascc_mpi_is_set(const ascc_mpi_particles *set)
+{
+    return set && set->magic == ASCC_MPI_MAGIC;
+}
+
+/* What walls have received from all fluid, on every process, in set->sums. errors: MEMORY, RANGE. */
+ascc_status ascc_mpi_sum_wall_impulses(ascc_mpi_particles *set);
+
+/* ---- exchange.c ---- */
+
+/* MPI_Allreduce of numbers in place, counted. */
+void ascc_mpi_reduce(ascc_mpi_particles *set, void *numbers, size_t count, MPI_Datatype type,
+                     MPI_Op op);
+/* Whether all processes give the same words. */
+bool ascc_mpi_alike(MPI_Comm comm, const uint64_t *words, size_t count);
+/* A call begins, which is no step. */
+void ascc_mpi_open(ascc_mpi_particles *set);
+
+/* OK where all are. */
+ascc_status ascc_mpi_agree(ascc_mpi_particles *set, ascc_status own);
+/* The same, of a call that is no step: a failure is told to all, with the process that failed. */
+ascc_status ascc_mpi_conclude(ascc_mpi_particles *set, ascc_status own, const char *text);
+/* Pairs in any order become lists by process; within one the order stays. */
+bool ascc_mpi_sort_pairs(ascc_mpi_particles *set, const ascc_mpi_pair *pair, size_t count,
+                         ascc_mpi_lists *lists);
+/* Rows of `size` bytes that were packed into set->outgoing by process, count[0][rank] of them, arrive in set->incoming,
+ * count[1][rank] of them. errors: those of any process. */
+ascc_status ascc_mpi_swap(ascc_mpi_particles *set, size_t size, size_t *received);
+ascc_status ascc_mpi_refresh(ascc_halo *halo, int set, const uint32_t *row,
+                             const ascc_halo_rows *arrays, size_t count);
+
+/* ---- rows.c: rows of fluid as bytes ---- */
+
+/* Bytes of a row; with its acceleration while a step has one. */
+size_t ascc_mpi_row_size(const ascc_mpi_particles *set);
+void ascc_mpi_pack_row(const ascc_mpi_particles *set, size_t row, unsigned char *bytes);
+void ascc_mpi_unpack_row(ascc_mpi_particles *set, size_t row, const unsigned char *bytes);
+/* Room for so many rows. */
+bool ascc_mpi_rows_reserve(ascc_mpi_particles *set, size_t rows);
+/* Drops fluid rows that are marked, one byte each. */
+void ascc_mpi_drop_rows(ascc_mpi_particles *set, const uint8_t *marked);
+/* Puts `count` packed rows where their ids want them; there is room. */
+void ascc_mpi_merge_rows(ascc_mpi_particles *set, const unsigned char *bytes, size_t count);
+
+/* ---- ghosts.c ---- */
+
+/* Fluid goes to whoever owns the block it is in; the curve is cut anew where that does not balance. */
+ascc_status ascc_mpi_settle(ascc_mpi_particles *set);
+ascc_status ascc_mpi_ghosts_begin(ascc_halo *halo, struct ascc_step *step,
+                                  ascc_particles *particles, ascc_motion *motion);
+void ascc_mpi_ghosts_end(ascc_halo *halo, ascc_particles *particles);
+
+/* ---- corners.c ---- */
+
+ascc_status ascc_mpi_corners(ascc_halo *halo, int level, double unit,
+                             const ascc_search_tools *tools, ascc_points *samples,
+                             const uint8_t **own);
+
+static inline ascc_mpi_particles *ascc_mpi_of_halo(ascc_halo *halo)
+{
+    return (ascc_mpi_particles *)(void *)((unsigned char *)halo -
+                                          offsetof(ascc_mpi_particles, halo));
+}
+
+#endif
