@@ -44,13 +44,15 @@ void ascc_contact_try(const ascc_contact *job, const ascc_way *way, uint32_t wal
     const size_t d = (size_t)p->dimension, row = ascc_hierarchy_wall_row(&state->hierarchy, wall);
     const double *n = p->wall_normal + row * d, *w1 = state->advance.wall + row * d;
     double place[3], begin = 0.0, end = 0.0, square = 0.0, along = 0.0;
-    const double *w0 = wall_at(job, row, way->when, place);
-    for (size_t c = 0; c < d; c++) {
-        begin += (way->from[c] - w0[c]) * n[c];
+    for (size_t c = 0; c < d; c++)
         end += (way->to[c] - w1[c]) * n[c];
-    }
+    if (!(end < job->distance - job->nothing)) /* most */
+        return;
+    const double *w0 = wall_at(job, row, way->when, place);
+    for (size_t c = 0; c < d; c++)
+        begin += (way->from[c] - w0[c]) * n[c];
     const bool sheet = state->hierarchy.sheets && state->hierarchy.sheets->is_sheet[wall];
-    if (!(end < job->distance - job->nothing && end < begin - job->nothing &&
+    if (!(end < begin - job->nothing &&
           (sheet ? begin >= 0.0 : begin > job->distance - job->slack)))
         return;
     ascc_meeting m = {.wall = wall};

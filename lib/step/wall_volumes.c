@@ -10,11 +10,18 @@
 #define AHEAD 0.01
 #define OPPOSITE (-0.99)
 
-/* The walls' positions and normals, [count][dimension]. */
+/* Walls' positions and normals, [count][dimension]: all, or those of some rows. */
 typedef struct places {
     const double *at, *normal;
     size_t count, d;
+    const uint32_t *row;   /* the host's rows; NULL: row i is the host's */
+    const uint8_t *wanted; /* whose volumes are asked for; NULL: all */
 } places;
+
+static size_t host_row(const places *p, size_t i)
+{
+    return p->row ? p->row[i] : i;
+}
 
 static bool are_known(const ascc_wall_volumes *walls, const places *p, double support)
 {
@@ -36,8 +43,8 @@ typedef struct volumes_job {
     const ascc_rows *rows;
     const places *places;
     const uint8_t *sheet;  /* [point] 1: of a thin wall, hidden from behind */
-    const uint32_t *order; /* host's row of a point */
-    float *volume;
+    const uint32_t *order; /* the place of a point */
+    float *volume;         /* of the host's rows */
 } volumes_job;
 
 /* Is point j, d supports from i, a thin wall's that is seen from behind? */
@@ -77,6 +84,8 @@ static void find_volumes(void *data, size_t begin, size_t end, int32_t slot)
     const double inverse = 1.0 / rows->radius;
     for (size_t i = begin; i < end; i++) {
         double sum = 0.0;
+        if (rows->count[i] == ASCC_ROW_ABSENT)
+            continue;
         for (uint32_t k = 0; k < rows->count[i]; k++) {
             const uint32_t j = rows->neighbor[rows->start[i] + k];
             double square = 0.0, d[3];
@@ -88,7 +97,8 @@ static void find_volumes(void *data, size_t begin, size_t end, int32_t slot)
             if (!is_hidden(job, i, j, d))
                 sum += spline_at(square);
         }
-        job->volume[job->order[i]] = (float)(1.0 / sum); /* itself is 1 */
+        /* itself is 1 */
+        job->volume[host_row(job->places, job->order[i])] = (float)(1.0 / sum);
     }
 }
 
@@ -108,7 +118,7 @@ static ascc_status sort_walls(const ascc_search_tools *tools, const places *p,
             if (!ascc_scale_apply(scale, p->at[i * d + c], &at[c]))
                 return ascc_fail(tools->message, ASCC_ERROR_RANGE,
                                  "boundary row %zu is too far from the origin for the relaxation",
-                                 i);
+                                 host_row(p, i));
         ascc_points_set(&raw, i, at);
     }
     *extent = ascc_extent_of(&raw, tools->workers);
@@ -138,15 +148,18 @@ static ascc_status make_volumes(float *volume, const ascc_search_tools *tools, c
                       .max_neighbors = MAX_NEIGHBORS};
     uint32_t *order = ascc_arena_take(tools->arena, p->count, sizeof *order);
     uint8_t *sheet = ascc_arena_take(tools->arena, p->count, 1);
-    if (!order || !sheet)
+    uint8_t *wanted = p->wanted ? ascc_arena_take(tools->arena, p->count, 1) : NULL;
+    if (!order || !sheet || (p->wanted && !wanted))
         return ascc_fail(tools->message, ASCC_ERROR_MEMORY, "no memory for %zu walls", p->count);
     ascc_status status = sort_walls(tools, p, &scale, rows.radius, &points, order, &extent);
     if (status == ASCC_OK)
         status = ascc_grid_build(&grid, tools, &points, &extent, rows.radius, true);
     if (status == ASCC_OK)
         status = ascc_rows_open(&rows, tools, 0);
+    for (size_t i = 0; status == ASCC_OK && wanted && i < p->count; i++)
+        wanted[i] = p->wanted[order[i]];
     if (status == ASCC_OK)
-        status = ascc_rows_make(&rows, tools, NULL);
+        status = ascc_rows_make(&rows, tools, wanted);
     volumes_job job = {&rows, p, sheet, order, volume};
     if (status == ASCC_OK)
         mark_sheets(p, &points, order, sheet);
@@ -155,15 +168,93 @@ static ascc_status make_volumes(float *volume, const ascc_search_tools *tools, c
     return status;
 }
 
+/* ---- Of some walls ---------------------------------------------------------------------------- */
+
+/* Supports that what a point adds to may be away from it, in coordinates that are rounded. */
+#define REACH 1.01
+
+/* The box around points that have changed, where they were and where they are. */
+typedef struct change {
+    const places *now;
+    const ascc_wall_volumes *before;
+    double low[3], high[3];
+} change;
+
+static bool has_changed(const change *c, size_t i)
+{
+    const size_t d = c->now->d, bytes = d * sizeof(double);
+    return memcmp(c->before->position + i * d, c->now->at + i * d, bytes) != 0 ||
+           memcmp(c->before->normal + i * d, c->now->normal + i * d, bytes) != 0;
+}
+
+static void find_changes(change *c)
+{
+    const size_t d = c->now->d;
+    for (size_t k = 0; k < d; k++) {
+        c->low[k] = (double)INFINITY;
+        c->high[k] = -(double)INFINITY;
+    }
+    for (size_t i = 0; i < c->now->count; i++) {
+        if (!has_changed(c, i))
+            continue;
+        for (size_t k = 0; k < d; k++) {
+            const double was = c->before->position[i * d + k], is = c->now->at[i * d + k];
+            c->low[k] = fmin(c->low[k], fmin(was, is));
+            c->high[k] = fmax(c->high[k], fmax(was, is));
+        }
+    }
+}
+
+static bool is_around(const change *c, size_t i, double margin)
+{
+    const size_t d = c->now->d;
+    const double *at = c->now->at + i * d;
+    bool in = true;
+    for (size_t k = 0; k < d; k++)
+        in &= at[k] >= c->low[k] - margin && at[k] <= c->high[k] + margin;
+    return in;
+}
+
+/* Volumes of points within a support of the box, for which those within two are looked at: in the host's order, so
+ * that cells and sums are those that all rows would give. */
+static ascc_status update_some(ascc_wall_volumes *walls, const ascc_search_tools *tools,
+                               const places *p, double support)
+{
+    const size_t d = p->d;
+    const double margin = REACH * support;
+    change c = {.now = p, .before = walls};
+    size_t near = 0, n = 0;
+    find_changes(&c);
+    for (size_t i = 0; i < p->count; i++)
+        near += is_around(&c, i, 2.0 * margin);
+    double *at = ascc_arena_take(tools->arena, near * d, sizeof *at);
+    double *normal = ascc_arena_take(tools->arena, near * d, sizeof *normal);
+    uint32_t *row = ascc_arena_take(tools->arena, near, sizeof *row);
+    uint8_t *wanted = ascc_arena_take(tools->arena, near, 1);
+    if (!at || !normal || !row || !wanted)
+        return ascc_fail(tools->message, ASCC_ERROR_MEMORY, "no memory for %zu walls", near);
+    for (size_t i = 0; i < p->count; i++) {
+        if (!is_around(&c, i, 2.0 * margin))
+            continue;
+        memcpy(at + n * d, p->at + i * d, d * sizeof *at);
+        memcpy(normal + n * d, p->normal + i * d, d * sizeof *normal);
+        row[n] = (uint32_t)i;
+        wanted[n++] = is_around(&c, i, margin);
+    }
+    const places some = {at, normal, n, d, row, wanted};
+    return make_volumes(walls->volume, tools, &some, support);
+}
+
 ascc_status ascc_wall_volumes_update(ascc_wall_volumes *walls, const ascc_search_tools *tools,
                                      const double *position, const double *normal, size_t count,
                                      int32_t dimension, double support)
 {
-    const places p = {position, normal, count, (size_t)dimension};
+    const places p = {.at = position, .normal = normal, .count = count, .d = (size_t)dimension};
     const size_t numbers = count * p.d;
+    const bool others = walls->count != count || walls->support != support;
     if (count == 0 || are_known(walls, &p, support))
         return ASCC_OK;
-    walls->count = 0;
+    walls->count = 0; /* until all is well */
     if (!ascc_grow(walls->allocator, (void **)&walls->volume, &walls->volume_capacity, count,
                    sizeof *walls->volume) ||
         !ascc_grow(walls->allocator, (void **)&walls->position, &walls->position_capacity, numbers,
@@ -171,7 +262,8 @@ ascc_status ascc_wall_volumes_update(ascc_wall_volumes *walls, const ascc_search
         !ascc_grow(walls->allocator, (void **)&walls->normal, &walls->normal_capacity, numbers,
                    sizeof *walls->normal))
         return ascc_fail(tools->message, ASCC_ERROR_MEMORY, "no memory for %zu walls", count);
-    const ascc_status status = make_volumes(walls->volume, tools, &p, support);
+    const ascc_status status = others ? make_volumes(walls->volume, tools, &p, support)
+                                      : update_some(walls, tools, &p, support);
     if (status != ASCC_OK)
         return status;
     memcpy(walls->position, position, numbers * sizeof *walls->position);
