@@ -673,6 +673,27 @@ static void a_sequence_with_a_nan_is_refused_by_name(void **state)
     free(m);
 }
 
+static void a_sequence_of_another_dimension_is_refused_by_name(void **state)
+{
+    (void)state;
+    const model_random random = small(24, 3);
+    const ascc_trainer_options o = default_options();
+    motion *m = make_motion(8, 2);
+    ascc_trainer *trainer = open_trainer(&o, &random, NULL);
+    m->sequence.dimension = 2;
+    assert_int_equal(ascc_trainer_add_sequence(trainer, &m->sequence), ASCC_ERROR_MISMATCH);
+    assert_non_null(strstr(ascc_trainer_message(trainer), m->sequence.name));
+    assert_non_null(strstr(ascc_trainer_message(trainer), "a 3D model cannot learn from 2D"));
+    ascc_trainer_destroy(&trainer);
+    free(m);
+    m = make_motion(8, 3);
+    trainer = open_trainer(&o, &random, NULL);
+    m->sequence.dimension = 3;
+    assert_int_equal(ascc_trainer_add_sequence(trainer, &m->sequence), ASCC_OK);
+    ascc_trainer_destroy(&trainer);
+    free(m);
+}
+
 static void a_sequence_without_interval_or_too_long_a_one_or_too_short_is_refused(void **state)
 {
     (void)state;
@@ -1170,6 +1191,7 @@ int main(void)
         cmocka_unit_test(the_hosts_floating_point_environment_changes_no_weight),
         cmocka_unit_test(going_on_from_a_saved_state_gives_the_same_bits),
         cmocka_unit_test(a_sequence_with_a_nan_is_refused_by_name),
+        cmocka_unit_test(a_sequence_of_another_dimension_is_refused_by_name),
         cmocka_unit_test(a_sequence_without_interval_or_too_long_a_one_or_too_short_is_refused),
         cmocka_unit_test(
             a_scene_in_other_spacings_has_the_same_gradient_where_time_goes_with_the_root),

@@ -97,6 +97,7 @@ wrong "network: 'coarse_channels' must be a list of 1" 's/"coarse_channels": .4.
 wrong "network: 'coarse_channels' must be a list of numbers" 's/"coarse_channels": .4./"coarse_channels": [9223372036854775807]/'
 wrong "network: 'coarse_channels' must be integers" 's/"coarse_channels": .4./"coarse_channels": [4.5]/'
 wrong "network: 'dimension' is 4" 's/"dimension": 2/"dimension": 4/'
+wrong "wbc2d_4_0000.safetensors: a 3D model cannot learn from 2D" 's/"dimension": 2/"dimension": 3/'
 wrong "network: 'kernel' does not understand 'mesh'" 's/"channels": 4,/"kernel": "mesh",/'
 wrong "contact is within 0 and wall_radius" 's/"channels": 4,/"contact": 9,/'
 wrong "projection is for kernel grid" 's/"channels": 4,/"projection": "radial",/'

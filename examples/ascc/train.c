@@ -141,7 +141,8 @@ static bool add_sequence(training *t, const ascc_train_source *source)
                                              .warm_up = source->warm_up,
                                              .jitter = source->jitter,
                                              .spacing = 2.0 * s.radius,
-                                             .boundary_moves = s.walls_move};
+                                             .boundary_moves = s.walls_move,
+                                             .dimension = s.dimension};
     const ascc_status status = ascc_trainer_add_sequence(t->trainer, &sequence);
     ascc_sequence_free(&s);
     return status == ASCC_OK || fail(t, source->path, ascc_trainer_message(t->trainer));

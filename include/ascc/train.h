@@ -75,7 +75,7 @@ typedef struct ascc_training_sequence {
     double jitter;          /* in place of the options', up to so much, drawn; 0 = the options' */
     double spacing;         /* m between its particles; 0 = the model's */
     int32_t boundary_moves; /* 1: the boundary's arrays are [frame][boundary][dimension] */
-    int32_t reserved2;
+    int32_t dimension;      /* of the arrays, 2 or 3, which must be the model's; 0 = the model's */
 } ascc_training_sequence;
 
 /** A stretch of the schedule: until iteration `end`. */
@@ -144,8 +144,8 @@ ASCC_API ascc_status ascc_trainer_create(ascc_train_context *context,
                                          size_t model_size, ascc_trainer **trainer);
 ASCC_API void ascc_trainer_destroy(ascc_trainer **trainer);
 
-/** Adds a sequence to learn from. errors: ARGUMENT, MEMORY, MISMATCH (an interval longer than the model
- * steps), NOT_FINITE (names the frame). */
+/** Adds a sequence to learn from. errors: ARGUMENT, MEMORY, MISMATCH (another dimension, an interval
+ * longer than the model steps), NOT_FINITE (names the frame). */
 ASCC_API ascc_status ascc_trainer_add_sequence(ascc_trainer *trainer,
                                                const ascc_training_sequence *sequence);
 

@@ -51,6 +51,10 @@ static ascc_status check(const ascc_plan *plan, const ascc_training_sequence *g,
         return ascc_fail(message, ASCC_ERROR_ARGUMENT,
                          "sequence %s: it needs at least 3 frames, fluid, and arrays of all it has",
                          name);
+    if (g->dimension && g->dimension != plan->dimension)
+        return ascc_fail(message, ASCC_ERROR_MISMATCH,
+                         "sequence %s: a %dD model cannot learn from %dD", name, plan->dimension,
+                         (int)g->dimension);
     if (!(g->time_step > 0.0) || !(g->spacing >= 0.0) || !isfinite(g->time_step + g->spacing) ||
         g->boundary_moves < 0 || g->boundary_moves > 1)
         return ascc_fail(message, ASCC_ERROR_ARGUMENT,
