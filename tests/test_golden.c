@@ -368,6 +368,7 @@ static void run_layers(network_case *n, test_tools *t, ascc_network *network, as
     assert_int_equal(ascc_network_create(network, &t->context->allocator, p, &n->model->packed,
                                          8192, &t->message),
                      ASCC_OK);
+    network->keeps_values = true;
     assert_int_equal(ascc_hierarchy_build(h, &t->search, p, &scene), ASCC_OK);
     assert_int_equal(ascc_network_demand(run, network, h, &t->search, NULL), ASCC_OK);
     assert_int_equal(ascc_network_forward(run, fluid, wall), ASCC_OK);

@@ -262,6 +262,42 @@ static void a_piece_that_grows_keeps_its_contents_and_gives_back_the_rest(void *
     assert_true(test_memory_is_clean(&memory));
 }
 
+/* In overflow blocks at first, then in one block. */
+static void what_was_taken_since_a_point_is_dropped(void **state)
+{
+    (void)state;
+    test_memory memory = {0};
+    const ascc_allocator allocator = test_memory_allocator(&memory);
+    ascc_arena arena;
+    ascc_arena_open(&arena, &allocator);
+    for (int turn = 0; turn < 3; turn++) {
+        unsigned char *const kept = ascc_arena_take(&arena, 100, 1);
+        unsigned char *grown = ascc_arena_take(&arena, 64, 1);
+        memset(kept, 1, 100);
+        const ascc_arena_mark mark = ascc_arena_mark_of(&arena);
+        unsigned char *const lent = ascc_arena_lend(&arena, 200, 1);
+        memset(lent, 2, 200);
+        const ascc_arena_point point = ascc_arena_point_of(&arena);
+        for (int k = 0; k < 50; k++) {
+            memset(ascc_arena_take(&arena, 1000, 1), 3, 1000);
+            if (k == 0) {
+                grown = ascc_arena_grow(&arena, grown, 64, 640, 1); /* goes with the rest */
+                memset(grown, 4, 640);
+            }
+            ascc_arena_drop(&arena, point);
+        }
+        assert_int_equal(kept[99], 1);
+        assert_int_equal(lent[199], 2);
+        assert_true(arena.taken <= 128 + 64);
+        assert_true(arena.needed <= 128 + 64 + 256 + 1024 + 640);
+        assert_true(ascc_arena_size(&arena) < 4096);
+        ascc_arena_return(&arena, mark);
+        ascc_arena_reset(&arena);
+    }
+    ascc_arena_close(&arena);
+    assert_true(test_memory_is_clean(&memory));
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -276,6 +312,7 @@ int main(void)
         cmocka_unit_test(an_arena_lives_on_without_memory),
         cmocka_unit_test(what_is_lent_is_lent_again_after_its_return),
         cmocka_unit_test(a_piece_that_grows_keeps_its_contents_and_gives_back_the_rest),
+        cmocka_unit_test(what_was_taken_since_a_point_is_dropped),
         cmocka_unit_test(an_arena_refuses_sizes_that_do_not_fit),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -104,7 +104,8 @@ bool ascc_grow(const ascc_allocator *allocator, void **memory, size_t *capacity,
 /* One piece that did not fit into the block; the piece follows this header. */
 struct ascc_arena_overflow {
     ascc_arena_overflow *next;
-    size_t size; /* header included */
+    size_t size;     /* header included */
+    uint64_t number; /* of all pieces of the arena: later ones are first in their list */
 };
 
 #define OVERFLOW_HEADER ((size_t)ASCC_ALIGNMENT)
@@ -124,6 +125,7 @@ static void *take_overflow(ascc_arena *arena, ascc_arena_overflow **list, size_t
         return NULL;
     piece->next = *list;
     piece->size = OVERFLOW_HEADER + size;
+    piece->number = arena->pieces++;
     *list = piece;
     return (unsigned char *)piece + OVERFLOW_HEADER;
 }
@@ -239,6 +241,22 @@ void *ascc_arena_grow(ascc_arena *arena, void *piece, size_t count, size_t grown
         count_needed(arena);
     }
     return moved;
+}
+
+ascc_arena_point ascc_arena_point_of(const ascc_arena *arena)
+{
+    return (ascc_arena_point){arena->front, arena->taken, arena->pieces};
+}
+
+void ascc_arena_drop(ascc_arena *arena, ascc_arena_point point)
+{
+    while (arena->taken_overflow && arena->taken_overflow->number >= point.pieces) {
+        ascc_arena_overflow *const piece = arena->taken_overflow;
+        arena->taken_overflow = piece->next;
+        ascc_release(arena->allocator, piece, 1, piece->size);
+    }
+    arena->front = ascc_min_size(arena->front, point.front);
+    arena->taken = ascc_min_size(arena->taken, point.taken);
 }
 
 void *ascc_arena_lend(ascc_arena *arena, size_t count, size_t element)

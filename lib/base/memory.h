@@ -28,7 +28,8 @@ bool ascc_grow(const ascc_allocator *allocator, void **memory, size_t *capacity,
                size_t element);
 
 /*
- * Hands out aligned pieces: taken ones live until the next reset, lent ones until they are returned.
+ * Hands out aligned pieces: taken ones live until the next reset, or until what was taken since some point is
+ * given back; lent ones until they are returned.
  *
  *   block:  [ taken | taken | taken |    free    | lent | lent ]    reset: all is free
  *   what does not fit goes into overflow blocks; reset replaces block and overflow by one block of
@@ -44,6 +45,7 @@ typedef struct ascc_arena {
     size_t taken, lent; /* overflow included */
     size_t needed;      /* the most of both together since the last reset */
     ascc_arena_overflow *taken_overflow, *lent_overflow;
+    uint64_t pieces; /* in overflow blocks, so far */
 } ascc_arena;
 
 /* Where lending stood. */
@@ -52,6 +54,12 @@ typedef struct ascc_arena_mark {
     ascc_arena_overflow *overflow;
 } ascc_arena_mark;
 
+/* Where taking stood. */
+typedef struct ascc_arena_point {
+    size_t front, taken;
+    uint64_t pieces;
+} ascc_arena_point;
+
 void ascc_arena_open(ascc_arena *arena, const ascc_allocator *allocator);
 void ascc_arena_close(ascc_arena *arena);
 /* count elements, not cleared; NULL when there is no memory. */
@@ -59,6 +67,9 @@ void *ascc_arena_take(ascc_arena *arena, size_t count, size_t element);
 /* A taken piece, or NULL, with room for more elements; contents stay. The old piece is given back at
  * once only if it did not fit into the block or is the last in it. NULL and unchanged without memory. */
 void *ascc_arena_grow(ascc_arena *arena, void *piece, size_t count, size_t grown, size_t element);
+/* Gives back all that was taken since the point was read, and of pieces that have grown since then all of it. */
+ascc_arena_point ascc_arena_point_of(const ascc_arena *arena);
+void ascc_arena_drop(ascc_arena *arena, ascc_arena_point point);
 /* Like take, but given back by return. */
 void *ascc_arena_lend(ascc_arena *arena, size_t count, size_t element);
 /* Gives back all that was lent since the mark was read; what was taken in between stays. */

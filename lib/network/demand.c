@@ -161,8 +161,10 @@ ascc_status ascc_network_create(ascc_network *network, const ascc_allocator *all
     network->last_reader[plan->output.term.source] = plan->layer_count;
     prepare_term(network, plan->term_count, ascc_network_set(network, plan->output.term.source));
     want_drift(network);
-    if (plan->relaxation.guess)
+    if (plan->relaxation.guess) {
         network->wants[plan->relaxation.guess] |= ASCC_WANTS_RECTIFIED;
+        network->last_reader[plan->relaxation.guess] = plan->layer_count;
+    }
     if (plan->edge_radius > 0.0) {
         const ascc_list_key edges = ascc_edges_list(plan);
         network->edge_key = find_key(network, &edges);
@@ -460,6 +462,52 @@ static ascc_status make_relaxed(ascc_network_run *run, int32_t key)
     return status;
 }
 
+/* Entries that there is room for in lists which outlive the layers: those of a relaxation, and of contact. */
+static size_t lasting_room(const ascc_network_run *run)
+{
+    const ascc_network *network = run->network;
+    size_t room = 0;
+    for (int i = 0; i < 2; i++)
+        room +=
+            network->relaxation_key[i] >= 0 ? run->rows[network->relaxation_key[i]].capacity : 0;
+    return run->plan->output.contact > 0.0
+               ? room + ascc_term_list(run, &run->plan->output.term, 1)->capacity
+               : room;
+}
+
+/* All lists, those first that outlive the layers. A list that grows moves, and what was taken before it stays. */
+static ascc_status make_lists(ascc_network_run *run)
+{
+    const ascc_network *network = run->network;
+    const bool halo = run->hierarchy->halo != NULL;
+    ascc_status status = halo ? demand_own(run) : demand_output(run);
+    for (int i = 0; status == ASCC_OK && i < 2 && network->relaxation_key[i] >= 0; i++)
+        status = make_relaxed(run, network->relaxation_key[i]);
+    const size_t lasting = lasting_room(run);
+    run->before_layers = ascc_arena_point_of(run->tools->arena);
+    for (int32_t l = network->plan->layer_count - 1; status == ASCC_OK && l >= 0 && !halo; l--)
+        status = demand_layer(run, l);
+    if (status == ASCC_OK && lasting_room(run) != lasting)
+        run->before_layers = ascc_arena_point_of(run->tools->arena);
+    return status;
+}
+
+/* The guess of a relaxation outlives the layers, too. */
+static bool take_guess(ascc_network_run *run)
+{
+    if (!run->plan->relaxation.guess)
+        return true;
+    const size_t count = run->hierarchy->set[ASCC_SET_FLUID].count;
+    run->guess = ascc_arena_take(run->tools->arena, count, sizeof *run->guess);
+    return run->guess != NULL;
+}
+
+void ascc_network_done(ascc_network_run *run)
+{
+    if (!run->network->keeps_values)
+        ascc_arena_drop(run->tools->arena, run->before_layers);
+}
+
 ascc_status ascc_network_demand(ascc_network_run *run, const ascc_network *network,
                                 ascc_hierarchy *hierarchy, const ascc_search_tools *tools,
                                 size_t *expected)
@@ -477,16 +525,11 @@ ascc_status ascc_network_demand(ascc_network_run *run, const ascc_network *netwo
     memset(run->value, 0, (size_t)network->value_count * sizeof *run->value);
     for (int32_t k = 0; k < network->key_count; k++)
         run->table[k] = NULL;
-    if (!take_active(run))
+    if (!take_active(run) || !take_guess(run))
         return ascc_fail(tools->message, ASCC_ERROR_MEMORY, "no memory for the network");
     ascc_status status = open_rows(run, expected);
     if (status == ASCC_OK)
-        status = hierarchy->halo ? demand_own(run) : demand_output(run);
-    for (int32_t l = network->plan->layer_count - 1;
-         status == ASCC_OK && l >= 0 && !hierarchy->halo; l--)
-        status = demand_layer(run, l);
-    for (int i = 0; status == ASCC_OK && i < 2 && network->relaxation_key[i] >= 0; i++)
-        status = make_relaxed(run, network->relaxation_key[i]);
+        status = make_lists(run);
     if (status == ASCC_OK && network->edge_key >= 0)
         status = number_edges(run);
     for (int32_t k = 0; status == ASCC_OK && k < network->key_count; k++) {

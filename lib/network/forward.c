@@ -167,18 +167,19 @@ static void compute_tiles(void *data, size_t begin, size_t end, int32_t slot)
     }
 }
 
-/* Edges are many, and their values mostly read once: one takes over the memory of another that has been read for
- * the last time before this layer, if there is one. */
+/* Values are mostly read once: one takes over the memory of another on the same set that has been read for the last
+ * time before this layer, if there is one. */
 static float *take_over(ascc_network_run *run, int32_t v, int32_t layer)
 {
     const ascc_network *network = run->network;
     const size_t channels = ascc_padded(ascc_network_channels(network, v));
-    if (ascc_network_set(network, v) != ASCC_SET_EDGES || network->keeps_values)
+    if (network->keeps_values)
         return NULL;
     for (int32_t u = 2; u < v; u++) {
         ascc_value *old = &run->value[u];
         float **memory = old->raw ? &old->raw : &old->rectified, *taken = *memory;
-        if (ascc_network_set(network, u) != ASCC_SET_EDGES || network->last_reader[u] >= layer ||
+        if (ascc_network_set(network, u) != ascc_network_set(network, v) ||
+            network->last_reader[u] >= layer ||
             ascc_padded(ascc_network_channels(network, u)) != channels || !taken)
             continue;
         *memory = NULL;
@@ -426,6 +427,15 @@ static ascc_status refresh_value(const ascc_network_run *run, int32_t l)
     return ascc_hierarchy_refresh(run->hierarchy, run->plan->layer[l].set, arrays, count);
 }
 
+static void keep_guess(void *data, size_t begin, size_t end, int32_t slot)
+{
+    (void)slot;
+    const ascc_network_run *run = data;
+    const ascc_value *value = &run->value[run->plan->relaxation.guess];
+    for (size_t i = begin; i < end; i++)
+        run->guess[i] = value->active[i] ? value->rectified[i * ascc_padded(1)] : 0.0f;
+}
+
 ascc_status ascc_network_forward(ascc_network_run *run, const float *fluid_features,
                                  const float *boundary_features)
 {
@@ -449,5 +459,8 @@ ascc_status ascc_network_forward(ascc_network_run *run, const float *fluid_featu
         if (status == ASCC_OK)
             status = refresh_value(run, l);
     }
+    if (status == ASCC_OK && run->guess)
+        ascc_workers_run(run->tools->workers, run->hierarchy->set[ASCC_SET_FLUID].count, 4096,
+                         keep_guess, run);
     return status;
 }

@@ -8,7 +8,8 @@
 #include "points/resample.h"
 #include "sheets.h"
 
-_Static_assert(ASCC_MAX_LEVELS <= ASCC_EXTENT_SETS, "an extent takes level 0 and all coarser ones");
+_Static_assert(ASCC_MAX_LEVELS < ASCC_EXTENT_SETS,
+               "an extent takes fluid, walls and all coarser levels");
 
 /* Which boundary particles the network sees: those within the crop of the fluid's bounding box. */
 static size_t keep_boundary(uint32_t *kept, const ascc_plan *plan, const ascc_scene *scene)
@@ -172,8 +173,17 @@ static void split(void *data, size_t begin, size_t end, int32_t slot)
     }
 }
 
+bool ascc_hierarchy_reads_whole(const ascc_plan *plan)
+{
+    bool reads = (plan->level_count > 1 && !plan->fluid_sampled) || plan->edge_set == ASCC_SET_ALL;
+    for (int32_t l = 0; l < plan->layer_count; l++)
+        reads |= plan->layer[l].set == ASCC_SET_ALL;
+    return reads;
+}
+
 /* Room for the sets of level 0 and the links between their rows. */
-static bool take_sets(ascc_hierarchy *h, ascc_arena *arena, size_t boundary_count)
+static bool take_sets(ascc_hierarchy *h, ascc_arena *arena, const ascc_plan *plan,
+                      size_t boundary_count)
 {
     const size_t count = h->fluid_count + boundary_count;
     h->origin = ascc_arena_take(arena, count, sizeof *h->origin);
@@ -183,7 +193,8 @@ static bool take_sets(ascc_hierarchy *h, ascc_arena *arena, size_t boundary_coun
     h->place[0] = ascc_arena_take(arena, h->fluid_count, 4 * sizeof(int32_t));
     h->place[1] = ascc_arena_take(arena, boundary_count, 4 * sizeof(int32_t));
     return h->origin && h->part && h->whole[0] && h->whole[1] && h->place[0] && h->place[1] &&
-           ascc_points_take(&h->set[ASCC_SET_ALL], arena, count) &&
+           ascc_points_room(&h->set[ASCC_SET_ALL], arena, count,
+                            ascc_hierarchy_reads_whole(plan) ? ascc_arena_take : ascc_arena_lend) &&
            ascc_points_take(&h->set[ASCC_SET_FLUID], arena, h->fluid_count) &&
            ascc_points_take(&h->set[ASCC_SET_BOUNDARY], arena, boundary_count);
 }
@@ -211,7 +222,7 @@ static ascc_status build_level_zero(ascc_hierarchy *h, const ascc_search_tools *
     job.kept = kept;
     job.order = order;
     job.part = ascc_part_size(count);
-    if (!order || !lend_raw(&job.raw, arena, count) || !take_sets(h, arena, kept_count))
+    if (!order || !lend_raw(&job.raw, arena, count) || !take_sets(h, arena, plan, kept_count))
         return ascc_fail(tools->message, ASCC_ERROR_MEMORY, "no memory for %zu points", count);
 
     ascc_workers_run(tools->workers, count, 4096, convert, &job);
@@ -229,8 +240,11 @@ static ascc_status build_level_zero(ascc_hierarchy *h, const ascc_search_tools *
     (void)ascc_part_sums(job.first);
     ascc_workers_run(tools->workers, count, 4096, break_ties, &job);
     ascc_workers_run(tools->workers, count, job.part, split, &job);
-    h->extent.set[0] = &h->set[ASCC_SET_ALL]; /* the same points, where they stay */
+    h->extent.set[0] = &h->set[ASCC_SET_FLUID]; /* the same points, where they stay */
+    h->extent.set[h->extent.set_count++] = &h->set[ASCC_SET_BOUNDARY];
     ascc_arena_return(arena, mark);
+    if (!ascc_hierarchy_reads_whole(plan))
+        h->set[ASCC_SET_ALL] = (ascc_points){.count = count};
     return ASCC_OK;
 }
 

@@ -11,8 +11,9 @@
 
 typedef struct ascc_hierarchy {
     ascc_scale scale;
-    ascc_points set[ASCC_MAX_SETS];
-    size_t fluid_count; /* rows of the host's fluid */
+    ascc_points
+        set[ASCC_MAX_SETS]; /* ASCC_SET_ALL has but a count where no layer or level reads it */
+    size_t fluid_count;     /* rows of the host's fluid */
     /* Rows of ASCC_SET_ALL, fluid and boundary in one order: */
     uint32_t *origin;    /* the host's row: fluid row, or fluid_count + boundary row */
     uint32_t *part;      /* the row in ASCC_SET_FLUID or ASCC_SET_BOUNDARY */
@@ -55,6 +56,9 @@ typedef struct ascc_scene {
 /* Builds all sets the plan uses in the arena. errors: MEMORY, RANGE. */
 ascc_status ascc_hierarchy_build(ascc_hierarchy *hierarchy, const ascc_search_tools *tools,
                                  const ascc_plan *plan, const ascc_scene *scene);
+
+/* Does anything look at places of fluid and walls as one set? */
+bool ascc_hierarchy_reads_whole(const ascc_plan *plan);
 
 /* The grid of a set for a search radius in units, made when first asked for. errors: MEMORY, RANGE. */
 ascc_status ascc_hierarchy_grid(ascc_hierarchy *hierarchy, const ascc_search_tools *tools, int set,

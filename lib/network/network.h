@@ -32,7 +32,7 @@ typedef struct ascc_network {
     double wall_reach;
     int32_t relaxation_key[2]; /* fluid and walls around the fluid; -1 = there is no relaxation */
     uint8_t *wants;            /* [value_count] ASCC_WANTS_* */
-    int32_t *last_reader;      /* [value_count] layers; layer_count: the output */
+    int32_t *last_reader;      /* [value_count] layers; layer_count: the output or the relaxation */
     int32_t max_neighbors;     /* of a point, before LIMIT */
     bool
         keeps_values; /* also those that readers are given tile by tile: for a way back, as all of a step then */
@@ -71,6 +71,10 @@ typedef struct ascc_network_run {
     ascc_rows *rows; /* [key_count] */
     ascc_edges edges;
     uint32_t **table; /* [key_count] what operations make of a list, else NULL */
+    float *
+        guess; /* [fluid rows] the pressure that a relaxation begins with, 0 where none; NULL: it has none */
+    ascc_arena_point
+        before_layers; /* what was taken since is read by layers and the output alone */
     float
         gravity[8]; /* of the step, in units of the model's own (if that is 0: m/s^2), then zeros */
     size_t neighbor_count;
@@ -93,6 +97,10 @@ ascc_status ascc_network_demand(ascc_network_run *run, const ascc_network *netwo
  * errors: MEMORY. */
 ascc_status ascc_network_forward(ascc_network_run *run, const float *fluid_features,
                                  const float *boundary_features);
+
+/* Gives back what only layers and the output read, once impulses are there: values, and lists of their own. What
+ * stays are flags, counts, and the lists of fluid that relaxation and contact read. Nothing, if values are kept. */
+void ascc_network_done(ascc_network_run *run);
 
 /* Is the value of a layer given to its readers tile by tile, and never stored? */
 bool ascc_network_passes_on(const ascc_network *network, int32_t layer);

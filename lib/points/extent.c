@@ -29,10 +29,16 @@ bool ascc_scale_apply(const ascc_scale *scale, double length, int64_t *units)
 
 bool ascc_points_take(ascc_points *points, ascc_arena *arena, size_t count)
 {
+    return ascc_points_room(points, arena, count, ascc_arena_take);
+}
+
+bool ascc_points_room(ascc_points *points, ascc_arena *arena, size_t count,
+                      void *(*room)(ascc_arena *, size_t, size_t))
+{
     points->count = count;
     for (int c = 0; c < 3; c++) {
-        points->position[c] = ascc_arena_take(arena, count, sizeof(int64_t));
-        points->low[c] = ascc_arena_take(arena, count, sizeof(int32_t));
+        points->position[c] = room(arena, count, sizeof(int64_t));
+        points->low[c] = room(arena, count, sizeof(int32_t));
         if (!points->position[c] || !points->low[c])
             return false;
     }

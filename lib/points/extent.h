@@ -35,7 +35,9 @@ typedef struct ascc_points {
     int32_t *low[3];
 } ascc_points;
 
-/* Room for count points in the arena. */
+/* Room for count points in the arena; room: ascc_arena_take or ascc_arena_lend. */
+bool ascc_points_room(ascc_points *points, ascc_arena *arena, size_t count,
+                      void *(*room)(ascc_arena *, size_t, size_t));
 bool ascc_points_take(ascc_points *points, ascc_arena *arena, size_t count);
 /* Sets point i, low words included. */
 static inline void ascc_points_set(ascc_points *points, size_t i, const int64_t position[3])

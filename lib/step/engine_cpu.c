@@ -70,6 +70,9 @@ ascc_status ascc_engine_cpu(ascc_step_state *state)
         status = state->network->plan->output.term.operation->impulses(
             &state->run, &scale, &state->impulses, &state->statistics->pair_count);
     }
+    ascc_arena_return(state->tools.arena, state->before_features);
+    if (status == ASCC_OK)
+        ascc_network_done(&state->run);
     ascc_stage_lap(state, "pairs");
     if (status == ASCC_OK)
         tell(state);

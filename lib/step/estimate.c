@@ -70,9 +70,12 @@ static double edge_count(const ascc_plan *plan, double fluid, double boundary)
     return set_points(plan, plan->edge_set, fluid, boundary) * row_length(plan, &key);
 }
 
-static double rows_bytes(const ascc_plan *plan, const ascc_list_key *key, double queries)
+/* What a list has: where rows begin, and the neighbours. */
+#define ROW_BYTES 12.0
+
+static double list_bytes(const ascc_plan *plan, const ascc_list_key *key, double queries)
 {
-    return queries * (12.0 + 4.0 * 1.125 * row_length(plan, key));
+    return queries * 4.0 * 1.125 * row_length(plan, key);
 }
 
 /* Slots of a set that is sorted again for a radius, and its cells. */
@@ -85,15 +88,15 @@ static double grid_bytes(const ascc_plan *plan, int32_t set, double radius, doub
     return points * ((sorted ? 0.0 : 16.0) + 12.0 / fmax(1.0, filled));
 }
 
-/* Grids and rows of all searches. */
-static double search_bytes(const ascc_network *network, double fluid, double boundary)
+/* Grids of all searches, and where their rows begin. */
+static double grids_bytes(const ascc_network *network, double fluid, double boundary)
 {
     const ascc_plan *plan = network->plan;
     double bytes = 0.0;
     for (int32_t k = 0; k < network->key_count; k++) {
         const ascc_list_key *key = &network->key[k];
         const double queries = set_points(plan, key->query, fluid, boundary);
-        bytes += rows_bytes(plan, key, queries);
+        bytes += ROW_BYTES * queries;
         bool query_done = false, source_done = false; /* grids are shared */
         for (int32_t j = 0; j < k; j++) {
             const ascc_list_key *old = &network->key[j];
@@ -110,32 +113,60 @@ static double search_bytes(const ascc_network *network, double fluid, double bou
     return bytes;
 }
 
-/* Values on edges that are there at once: those of one channel count that are still to be read. */
-static double edge_value_bytes(const ascc_network *network, double edges)
+/* Neighbour lists that outlive the layers, or the others. */
+static double lists_bytes(const ascc_network *network, double fluid, double boundary, bool lasting)
 {
-    double most = 0.0;
+    double bytes = 0.0;
+    for (int32_t k = 0; k < network->key_count; k++) {
+        const ascc_list_key *key = &network->key[k];
+        const bool lasts = k == network->relaxation_key[0] || k == network->relaxation_key[1] ||
+                           k == network->term_key[network->plan->term_count][0];
+        if (lasts == lasting)
+            bytes += list_bytes(network->plan, key,
+                                set_points(network->plan, key->query, fluid, boundary));
+    }
+    return bytes;
+}
+
+/* Floats that are stored of a value's row. */
+static double value_width(const ascc_network *network, int32_t v)
+{
+    const bool stored = v < 2 || !ascc_network_passes_on(network, v - 2);
+    const int copies = (network->wants[v] & 1) + (network->wants[v] >> 1 & 1);
+    return stored ? copies * (double)ascc_padded(ascc_network_channels(network, v)) : 0.0;
+}
+
+/* Do two values take over memory from each other? */
+static bool are_alike(const ascc_network *network, int32_t v, int32_t u)
+{
+    return v > 1 && u > 1 && ascc_network_set(network, v) == ascc_network_set(network, u) &&
+           ascc_padded(ascc_network_channels(network, v)) ==
+               ascc_padded(ascc_network_channels(network, u));
+}
+
+/* Floats of a row of all values like v, those at once that are still to be read. */
+static double width_at_once(const ascc_network *network, int32_t v)
+{
+    double most = value_width(network, v);
     for (int32_t l = 0; l < network->plan->layer_count; l++) {
         double floats = 0.0;
-        for (int32_t v = 2; v <= l + 2; v++)
-            if (ascc_network_set(network, v) == ASCC_SET_EDGES && network->last_reader[v] >= l &&
-                !ascc_network_passes_on(network, v - 2))
-                floats += ((network->wants[v] & 1) + (network->wants[v] >> 1 & 1)) *
-                          (double)ascc_padded(ascc_network_channels(network, v));
+        for (int32_t u = 2; u <= l + 2; u++)
+            if (are_alike(network, v, u) && network->last_reader[u] >= l)
+                floats += value_width(network, u);
         most = fmax(most, floats);
     }
-    return 4.0 * edges * most;
+    return most;
 }
 
 static double value_bytes(const ascc_network *network, double fluid, double boundary)
 {
     double bytes = 0.0;
     for (int32_t v = 0; v < network->value_count; v++) {
-        const bool stored = ascc_network_set(network, v) != ASCC_SET_EDGES &&
-                            (v < 2 || !ascc_network_passes_on(network, v - 2));
-        const double copies =
-            stored ? 4.0 * ((network->wants[v] & 1) + (network->wants[v] >> 1 & 1)) : 0.0;
+        bool counted = false;
+        for (int32_t u = 2; u < v; u++)
+            counted |= are_alike(network, u, v);
         bytes += set_points(network->plan, ascc_network_set(network, v), fluid, boundary) *
-                 (1.0 + copies * (double)ascc_padded(ascc_network_channels(network, v)));
+                 (1.0 + (counted ? 0.0 : 4.0 * width_at_once(network, v)));
     }
     return bytes;
 }
@@ -174,7 +205,8 @@ static double hierarchy_bytes(const ascc_plan *plan, double fluid, double bounda
         const double keys = corners && plan->hysteresis > 0.0 ? 2.0 * all : all;
         bytes = fmax(bytes, 16.0 * keys + (corners ? 16.0 * (1 << plan->dimension) : 8.0) * points);
     }
-    return bytes + all * plan->dimension * 8.0;
+    return bytes +
+           all * (plan->dimension * 8.0 + (ascc_hierarchy_reads_whole(plan) ? 0.0 : POINT_BYTES));
 }
 
 /* Lent for a relaxation: numbers and pairs of each row, its impulses; and its walls as points with rows. */
@@ -189,8 +221,8 @@ static double relaxation_bytes(const ascc_network *network, double fluid, double
     if (plan->relaxation.rounds > 1) {
         const ascc_list_key wall_key = {
             .query = ASCC_SET_FLUID, .source = ASCC_SET_BOUNDARY, .radius = key.radius};
-        anew = 3.0 * (fluid + boundary) * (2.0 * POINT_BYTES + 28.0) +
-               rows_bytes(plan, &key, fluid) + rows_bytes(plan, &wall_key, fluid);
+        anew = 3.0 * (fluid + boundary) * (2.0 * POINT_BYTES + 28.0) + 2.0 * ROW_BYTES * fluid +
+               list_bytes(plan, &key, fluid) + list_bytes(plan, &wall_key, fluid);
     }
     const double walls = 2.0 * POINT_BYTES + 4.0 + SORT_BYTES + 4.0 * 1.125 * WALL_NEIGHBORS;
     return fluid * (100.0 + 20.0 * (row_length(plan, &key) + 7.0) + 41.0 + 8.0 * plan->dimension) +
@@ -202,22 +234,23 @@ size_t ascc_estimate_scratch(const ascc_network *network, size_t fluid, size_t b
 {
     const ascc_plan *plan = network->plan;
     const double f = (double)fluid, b = (double)boundary, all = f + b, d = plan->dimension;
-    double points = 8.0 * d * (5.0 * f + b) + all * (2.0 * POINT_BYTES + 28.0);
+    double points = 8.0 * d * (5.0 * f + b) +
+                    all * ((ascc_hierarchy_reads_whole(plan) ? 2.0 : 1.0) * POINT_BYTES + 28.0);
     for (int32_t l = 1; l < plan->level_count; l++)
         points += POINT_BYTES * set_points(plan, ASCC_SET_LEVEL + l - 1, f, b);
     double longest = 0.0;
     for (int32_t k = 0; k < network->key_count; k++)
         longest = fmax(longest, row_length(plan, &network->key[k]));
     if (plan->edge_radius > 0.0)
-        points += (EDGE_BYTES)*edge_count(plan, f, b) + 8.0 * all +
-                  edge_value_bytes(network, edge_count(plan, f, b));
+        points += EDGE_BYTES * edge_count(plan, f, b) + 8.0 * all;
     const double features = 4.0 * (f * plan->fluid_channels + b * plan->boundary_channels);
-    const double search = search_bytes(network, f, b);
+    const double lasting = grids_bytes(network, f, b) + lists_bytes(network, f, b, true);
     const double forward =
         features + all * 4.0 + (double)threads * layer_bytes(plan, 1.5 * longest);
-    const double last = fmax(all * output_bytes(plan), relaxation_bytes(network, f, b));
+    const double layers = lists_bytes(network, f, b, false) + value_bytes(network, f, b) +
+                          fmax(forward, all * output_bytes(plan));
     double bytes = fmax(features + hierarchy_bytes(plan, f, b),
-                        search + value_bytes(network, f, b) + fmax(forward, last));
+                        lasting + fmax(layers, relaxation_bytes(network, f, b)));
     bytes = 1.125 * (points + bytes) + 64e3; /* what a block has more; small things */
     return bytes < (double)(SIZE_MAX / 2) ? (size_t)bytes : SIZE_MAX / 2;
 }

@@ -43,11 +43,10 @@ typedef struct relaxation {
     float *own[3];                                       /* sum of g, walls included */
     float *push[3];                                      /* the same by weight */
     float *excess, *response, *pressure, *change, *move; /* move: rows of 4 */
-    uint8_t *near;          /* rows with neighbours within the repulsion */
-    const float *guess;     /* [count][padded] of pressures, times D_lattice; NULL = 0 */
-    const uint8_t *guessed; /* rows that have one */
-    const double *place;    /* [count][3] before the step, if corrections lie along those lines */
-    float *scratch;         /* [slots][4][room] */
+    uint8_t *near;       /* rows with neighbours within the repulsion */
+    const float *guess;  /* [count] pressures times D_lattice; NULL = 0 */
+    const double *place; /* [count][3] before the step, if corrections lie along those lines */
+    float *scratch;      /* [slots][4][room] */
     size_t room;
     ascc_relaxation_trace *trace; /* of a step whose values are kept, else NULL */
     float omega;                  /* of the sweep under way */
@@ -527,7 +526,7 @@ static void guess_rows(void *data, size_t begin, size_t end, int32_t slot)
     relaxation *r = data;
     const float unit = (float)(ascc_step_share(r->state) / r->constants->lattice_response);
     for (size_t i = begin; i < end; i++)
-        r->pressure[i] = r->guessed[i] ? unit * r->guess[i * ascc_padded(1)] : 0.0f;
+        r->pressure[i] = unit * r->guess[i];
 }
 
 /* The first sweep of all without a guess: nothing has moved yet. */
@@ -818,10 +817,8 @@ static ascc_status relax(ascc_step_state *state, relaxation *r, int64_t *given,
         status = no_memory(state);
     if (status != ASCC_OK)
         return status;
-    if (r->constants->guess && first) {
-        r->guess = state->run.value[r->constants->guess].rectified;
-        r->guessed = state->run.value[r->constants->guess].active;
-    }
+    if (first)
+        r->guess = state->run.guess;
     memset(r->change, 0, r->count * sizeof *r->change);
     status = measure(r, found);
     if (status == ASCC_OK && first)
