@@ -15,21 +15,22 @@ if ! have mpirun || [ ! -x "$build/tests/mpi_check" ]; then
     exit 0
 fi
 
-# PROCESSES THREADS, then a model, a scene and steps for each case.
-same() {
-    processes=$1
-    threads=$2
+# PROGRAM PROCESSES, then its arguments.
+distributed() {
+    program=$1
+    processes=$2
     shift 2
-    timeout 120 mpirun -n "$processes" "$build/tests/mpi_check" "$threads" "$@"
+    timeout 120 mpirun -n "$processes" "$build/tests/$program" "$@"
 }
 models=examples/models
 flat="$models/water2d.safetensors"
 deep="$models/water3d.safetensors"
-for processes in 1 2 3 4 7; do
-    threads=$((processes % 2 + 1))
-    # shellcheck disable=SC2086
-    check "hash, sums and snapshot of $processes processes are those of one" same $processes $threads \
-        $flat dam 8 $flat drops 8 $flat tank 8 $deep dam 4 $deep drops 4 $deep tank 4 $models/pbf3d.safetensors dam 4
-done
+check 'what 1 process with 2 threads computes is what one computes alone' distributed mpi_check 1 2 $flat dam 4 $deep tank 2
+check '2 processes' distributed mpi_check 2 1 $flat dam 6 $flat tank 6 $deep drops 4
+check '3 processes of 2 threads' distributed mpi_check 3 2 $flat drops 8 $deep dam 4 $models/pbf3d.safetensors dam 3
+check '4 processes' distributed mpi_check 4 1 $flat tank 6 $deep tank 4
+check '7 processes' distributed mpi_check 7 1 $flat drops 6 $deep dam 3
+check 'all calls, right and wrong, on 2 processes' distributed mpi_calls 2 2 $flat
+check 'and on 3' distributed mpi_calls 3 1 $deep
 echo "1..$number"
 exit $failed

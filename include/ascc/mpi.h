@@ -78,6 +78,11 @@ ASCC_API ascc_status ascc_mpi_particles_body_impulse(ascc_mpi_particles *set, in
                                                      const double point[3], int64_t impulse[3],
                                                      double torque[3]);
 
+/** What ascc_bodies_impulse is of the whole set, on every process: of the local set it tells a part. */
+ASCC_API ascc_status ascc_mpi_bodies_impulse(ascc_mpi_particles *set, size_t count,
+                                             const int32_t *bodies, int64_t (*impulse)[3],
+                                             double (*torque)[3]);
+
 /**
  * Makes an ordinary set on process `root` what the whole is: for snapshots, which are the same bytes for any number of
  * processes, sequences, measures. whole: a set of that dimension; read on root alone. errors: ARGUMENT, MEMORY, MISMATCH,
@@ -127,8 +132,9 @@ typedef struct ascc_mpi_statistics {
     uint64_t bytes;     /* of these */
     uint64_t refreshes; /* exchanges of values of ghosts */
     uint64_t
-        collectives; /* calls of MPI_Allreduce, MPI_Alltoall and the like, of a few bytes mostly */
-    double seconds;  /* wall clock in messages and collective calls: most of it is waiting */
+        collectives;  /* calls of MPI_Allreduce, MPI_Alltoall and the like, of a few bytes mostly */
+    uint64_t repeats; /* steps begun again, with copies from farther away */
+    double seconds;   /* wall clock in messages and collective calls: most of it is waiting */
 } ascc_mpi_statistics;
 
 /** Local. */

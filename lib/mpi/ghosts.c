@@ -123,6 +123,8 @@ static ascc_status balance(ascc_mpi_particles *set)
     if (set->cut && ++set->age < LOOK)
         return ASCC_OK;
     set->age = 0;
+    set->halo.reached = fmax(ASCC_MPI_SPARE * set->farthest, ASCC_MPI_NEAR * set->local->spacing);
+    set->farthest = 0.0;
     ascc_mpi_reduce(set, &most, 1, MPI_UINT64_T, MPI_MAX);
     if (set->cut && (double)most * set->size <= UNEVEN * (double)set->halo.total + set->size)
         return ASCC_OK;

@@ -8,7 +8,7 @@
 #include "base/words.h"
 #include "set.h"
 
-_Static_assert(sizeof(ascc_mpi_statistics) == 64 + sizeof(size_t) || sizeof(void *) != 8,
+_Static_assert(sizeof(ascc_mpi_statistics) == 72 + sizeof(size_t) || sizeof(void *) != 8,
                "released layout");
 
 /* ---- Making one ---- */
@@ -192,11 +192,11 @@ ascc_status ascc_mpi_particles_add_fluid(ascc_mpi_particles *set, size_t count,
         return ASCC_ERROR_ARGUMENT;
     ascc_mpi_open(set);
     ascc_particles *p = set->local;
-    const uint64_t next = p->next_id;
-    uint64_t before = count, total = count;
+    uint64_t before = count, total = count, next = p->next_id;
     MPI_Scan(MPI_IN_PLACE, &before, 1, MPI_UINT64_T, MPI_SUM, set->comm);
     set->statistics.collectives++;
     ascc_mpi_reduce(set, &total, 1, MPI_UINT64_T, MPI_SUM);
+    ascc_mpi_reduce(set, &next, 1, MPI_UINT64_T, MPI_MAX);
     const bool fits = total <= ASCC_ID_LIMIT - next;
     p->next_id = fits ? next + (before - count) : next;
     ascc_status status = fits ? ASCC_OK : ASCC_ERROR_RANGE;
@@ -394,11 +394,10 @@ ascc_status ascc_mpi_sum_wall_impulses(ascc_mpi_particles *set)
     return ASCC_OK;
 }
 
-ascc_status ascc_mpi_particles_body_impulse(ascc_mpi_particles *set, int32_t body,
-                                            const double point[3], int64_t impulse[3],
-                                            double torque[3])
+/* Every process asks its own set, which for a while has what all fluid gave to walls. */
+static ascc_status ask(ascc_mpi_particles *set, ascc_status (*question)(ascc_particles *, void *),
+                       void *data)
 {
-    ASCC_FLOAT_SCOPE;
     char text[ASCC_MESSAGE_CAPACITY] = "";
     if (!ascc_mpi_is_set(set))
         return ASCC_ERROR_ARGUMENT;
@@ -409,9 +408,52 @@ ascc_status ascc_mpi_particles_body_impulse(ascc_mpi_particles *set, int32_t bod
     ascc_particles *p = set->local;
     int64_t *own = p->wall_impulse;
     p->wall_impulse = set->sums.at;
-    status = ascc_particles_body_impulse(p, body, point, impulse, torque);
+    status = question(p, data);
     p->wall_impulse = own;
     if (status != ASCC_OK)
         ascc_context_message(set->context, text, sizeof text);
     return ascc_mpi_conclude(set, status, text);
+}
+
+typedef struct body_question {
+    int32_t body;
+    const double *point;
+    int64_t *impulse;
+    double *torque;
+} body_question;
+
+static ascc_status ask_body(ascc_particles *p, void *data)
+{
+    const body_question *q = data;
+    return ascc_particles_body_impulse(p, q->body, q->point, q->impulse, q->torque);
+}
+
+ascc_status ascc_mpi_particles_body_impulse(ascc_mpi_particles *set, int32_t body,
+                                            const double point[3], int64_t impulse[3],
+                                            double torque[3])
+{
+    ASCC_FLOAT_SCOPE;
+    body_question question = {body, point, impulse, torque};
+    return ask(set, ask_body, &question);
+}
+
+typedef struct bodies_question {
+    size_t count;
+    const int32_t *bodies;
+    int64_t (*impulse)[3];
+    double (*torque)[3];
+} bodies_question;
+
+static ascc_status ask_bodies(ascc_particles *p, void *data)
+{
+    const bodies_question *q = data;
+    return ascc_bodies_impulse(p, q->count, q->bodies, q->impulse, q->torque);
+}
+
+ascc_status ascc_mpi_bodies_impulse(ascc_mpi_particles *set, size_t count, const int32_t *bodies,
+                                    int64_t (*impulse)[3], double (*torque)[3])
+{
+    ASCC_FLOAT_SCOPE;
+    bodies_question question = {count, bodies, impulse, torque};
+    return ask(set, ask_bodies, &question);
 }

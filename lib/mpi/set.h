@@ -43,11 +43,11 @@ struct ascc_mpi_particles {
     ascc_curve curve;
     ascc_owners owners;
     bool cut;                                /* the curve is cut by what fluid there is */
+    double farthest;                         /* that fluid has gone since then, host's unit */
     uint64_t age;                            /* steps since the last look at the balance */
     ascc_mpi_ghosts ghosts[ASCC_MAX_LEVELS]; /* fluid, then levels by number */
     double reach[ASCC_MAX_LEVELS];           /* host's unit: how far a row of the set is read */
-    double relaxed;       /* likewise, from where fluid is when it is searched again; or 0 */
-    ascc_mpi_array flags; /* uint8_t: ghosts among fluid rows */
+    ascc_mpi_array flags;                    /* uint8_t: ghosts among fluid rows */
     ascc_mpi_array pairs, outgoing, incoming, loads, kept, sums, pending;
     size_t kept_size;
     size_t *counts; /* [4][size] */
@@ -62,8 +62,11 @@ struct ascc_mpi_particles {
     ascc_message message;
 };
 
-#define ASCC_MPI_ALIKE 24          /* words that ascc_mpi_alike compares, at most */
-#define ASCC_MPI_EDGE 8.0          /* of a block, spacings */
+#define ASCC_MPI_ALIKE 24 /* words that ascc_mpi_alike compares, at most */
+#define ASCC_MPI_EDGE 8.0 /* of a block, spacings */
+/* Ghosts serve so far, spacings, and by this factor farther than fluid has gone. */
+#define ASCC_MPI_NEAR 0.5
+#define ASCC_MPI_SPARE 1.25
 #define ASCC_MPI_MAGIC 0x49435341u /* "ASCI" */
 
 bool ascc_mpi_room(ascc_mpi_particles *set, ascc_mpi_array *array, size_t count, size_t element);

@@ -13,9 +13,15 @@ static ascc_status agree(ascc_halo *halo, ascc_status own)
     return ascc_mpi_agree(ascc_mpi_of_halo(halo), own);
 }
 
-static void widen(ascc_halo *halo, double reached)
+static bool serve(ascc_halo *halo, double distance)
 {
-    halo->reached = 1.25 * reached;
+    ascc_mpi_particles *set = ascc_mpi_of_halo(halo);
+    set->farthest = fmax(set->farthest, distance);
+    if (distance <= halo->reached || set->size == 1)
+        return true;
+    halo->reached = ASCC_MPI_SPARE * distance;
+    set->statistics.repeats++;
+    return false;
 }
 
 static bool keep(ascc_halo *halo, const ascc_particles *particles)
@@ -79,10 +85,10 @@ static void open_halo(ascc_mpi_particles *set, ascc_step *step)
 {
     const double reached = set->halo.reached;
     set->halo = (ascc_halo){.own = set->local->fluid_count,
-                            .reached = reached > 0.0 ? reached : 0.5 * set->local->spacing,
+                            .reached = fmax(reached, ASCC_MPI_NEAR * set->local->spacing),
                             .begin = ascc_mpi_ghosts_begin,
                             .end = ascc_mpi_ghosts_end,
-                            .widen = widen,
+                            .serve = serve,
                             .keep = keep,
                             .take_back = take_back,
                             .agree = agree,

@@ -39,8 +39,8 @@ struct ascc_halo {
     ascc_status (*begin)(ascc_halo *halo, struct ascc_step *step, ascc_particles *particles,
                          struct ascc_motion *motion);
     void (*end)(ascc_halo *halo, ascc_particles *particles);
-    /* Ghosts that serve at least so far from now on. */
-    void (*widen)(ascc_halo *halo, double reached);
+    /* Whether ghosts serve so far; where they do not, those of the next attempt do: `reached` is larger then. */
+    bool (*serve)(ascc_halo *halo, double distance);
     /* The state before the first of several substeps, and back to it. */
     bool (*keep)(ascc_halo *halo, const ascc_particles *particles);
     void (*take_back)(ascc_halo *halo, ascc_particles *particles);

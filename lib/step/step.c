@@ -413,8 +413,8 @@ static ascc_status run_with_ghosts(ascc_step *step, ascc_particles *p, ascc_moti
     ascc_status status;
     do {
         const ascc_step_statistics before = step->statistics;
-        reached = halo->reached;
         status = halo->begin(halo, step, p, motion);
+        reached = halo->reached;
         if (status == ASCC_OK)
             status = ascc_step_once(step, p, motion, first, &step->arena, state);
         halo->end(halo, p);
