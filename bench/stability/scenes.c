@@ -485,7 +485,9 @@ const stability_scene stability_scenes[] = {
     {"tap",
      "fluid falls into a tank: no escape; as many as the rate says; no pair ever nearer than "
      "spacing / 5; "
-     "in the end mean density within 3 % of rest, away from walls and surface",
+     "in the end mean density within 3 % of that of as much fluid that was there from the "
+     "beginning, "
+     "away from walls and surface",
      200, 500, stability_tap},
     {NULL, NULL, 0, 0, NULL},
 };
