@@ -175,6 +175,9 @@ run relax --new 2 --spacing 0.02 --dt 0.005 -o r.safetensors
 holds 'ascc relax --new makes a model that runs' "$ascc" sim r.safetensors dam-break-2d --size 8 -n 20
 run relax r.safetensors --omega 0.5,0.5 --divergence none -o s.safetensors
 holds 'and another relaxation takes its place' sh -c 'grep -q "omega[^a-z]*0.5,0.5]" s.safetensors && ! grep -q divergence s.safetensors'
+run relax r.safetensors --hyperviscosity 0.5,0.4 --below 0.2 -o s.safetensors
+holds 'a relaxation with a hyperviscosity runs' "$ascc" sim s.safetensors dam-break-2d --size 8 -n 20
+refuses 1 "'shares'" relax r.safetensors --hyperviscosity 0.6 -o s.safetensors
 refuses 1 "output" relax r.safetensors --none -o s.safetensors
 rm -f r.safetensors s.safetensors r.txt
 

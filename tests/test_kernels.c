@@ -1186,6 +1186,27 @@ static void kept_gradients_are_those_that_are_not_0_on_every_cpu(void **state)
     }
 }
 
+enum { ROWS = 90, LONGEST = 88 }; /* rows of more than one batch */
+
+static ascc_gradients random_gradients(void)
+{
+    static float g[3][ROWS * LONGEST];
+    static uint32_t neighbor[ROWS * LONGEST];
+    static size_t start[ROWS], end[ROWS];
+    for (size_t i = 0; i < ROWS; i++) {
+        const size_t pairs = i % 3 ? next() % 40 : LONGEST - 3;
+        start[i] = i * LONGEST;
+        end[i] = start[i] + (pairs + 7) / 8 * 8;
+        for (size_t k = 0; k < end[i] - start[i]; k++) {
+            neighbor[start[i] + k] = k < pairs ? (uint32_t)((i + 1 + k) % ROWS) : (uint32_t)i;
+            for (int c = 0; c < 3; c++)
+                g[c][start[i] + k] = k < pairs ? uniform() : 0.0f;
+        }
+    }
+    return (ascc_gradients){
+        .start = start, .end = end, .neighbor = neighbor, .g = {g[0], g[1], g[2]}};
+}
+
 /* Pairs of a row with rows after it, in doubles. */
 static void press_in_doubles(const ascc_gradients *pairs, const ascc_pressures *p, size_t row,
                              double (*sum)[3])
@@ -1220,29 +1241,17 @@ static void press_in_doubles(const ascc_gradients *pairs, const ascc_pressures *
 static void pressure_impulses_equal_doubles_and_have_the_same_bits_on_every_cpu(void **state)
 {
     (void)state;
-    enum { ROWS = 90, LONGEST = 88 }; /* rows of more than one batch */
     ascc_kernels table[16];
     const int count = tables(table);
-    static float g[3][ROWS * LONGEST], pressure[ROWS];
-    static uint32_t neighbor[ROWS * LONGEST];
+    static float pressure[ROWS];
     static double mass[ROWS], place[ROWS * 3];
-    size_t start[ROWS], end[ROWS];
+    const ascc_gradients pairs = random_gradients();
     for (size_t i = 0; i < ROWS; i++) {
-        const size_t pairs = i % 3 ? next() % 40 : LONGEST - 3;
-        start[i] = i * LONGEST;
-        end[i] = start[i] + (pairs + 7) / 8 * 8;
-        for (size_t k = 0; k < end[i] - start[i]; k++) {
-            neighbor[start[i] + k] = k < pairs ? (uint32_t)((i + 1 + k) % ROWS) : (uint32_t)i;
-            for (int c = 0; c < 3; c++)
-                g[c][start[i] + k] = k < pairs ? uniform() : 0.0f;
-        }
         pressure[i] = next() % 3 ? fabsf(uniform()) : 0.0f;
         mass[i] = 1.5 + (double)uniform();
         for (int c = 0; c < 3; c++)
             place[i * 3 + (size_t)c] = (double)uniform();
     }
-    const ascc_gradients pairs = {
-        .start = start, .end = end, .neighbor = neighbor, .g = {g[0], g[1], g[2]}};
     for (int options = 0; options < 8; options++) {
         static double want[ROWS][3];
         static int64_t first[ROWS * 4], got[ROWS * 4];
@@ -1271,6 +1280,66 @@ static void pressure_impulses_equal_doubles_and_have_the_same_bits_on_every_cpu(
     }
 }
 
+/* by |g|^2 and the smaller coefficient: of row i, the difference to a neighbour */
+static void weigh_in_doubles(const ascc_gradients *pairs, size_t i, size_t k, const float *move,
+                             double difference[3])
+{
+    const float *row = move + i * 4, *other = move + (size_t)pairs->neighbor[k] * 4;
+    double weight = 0.0;
+    for (int c = 0; c < 3; c++)
+        weight += (double)pairs->g[c][k] * (double)pairs->g[c][k];
+    for (int c = 0; c < 3; c++)
+        difference[c] =
+            weight * (double)fminf(row[3], other[3]) * ((double)row[c] - (double)other[c]);
+}
+
+static void roughness_equals_doubles_and_has_the_same_bits_on_every_cpu(void **state)
+{
+    (void)state;
+    ascc_kernels table[16];
+    const int count = tables(table);
+    const ascc_gradients pairs = random_gradients();
+    static float move[ROWS * 4], rough[ROWS * 4], first[ROWS * 4];
+    static double want[ROWS][3], impulse[ROWS][3];
+    static int64_t given[ROWS * 4], first_given[ROWS * 4];
+    for (size_t i = 0; i < ROWS * 4; i++)
+        move[i] = i % 4 == 3 ? fabsf(uniform()) : uniform();
+    for (size_t i = 0; i < ROWS; i++)
+        for (size_t k = pairs.start[i]; k < pairs.end[i]; k++) {
+            const size_t j = pairs.neighbor[k];
+            double d[3];
+            weigh_in_doubles(&pairs, i, k, move, d);
+            for (int c = 0; c < 3; c++) {
+                want[i][c] += d[c];
+                impulse[i][c] -= j > i ? 1e9 * d[c] : 0.0;
+                impulse[j][c] += j > i ? 1e9 * d[c] : 0.0;
+            }
+        }
+    for (int t = 0; t < count; t++) {
+        table[t].roughness(&pairs, 0, 33, move, rough);
+        table[t].roughness(&pairs, 33, ROWS, move, rough);
+        memset(given, 0, sizeof given);
+        for (size_t i = 0; i < ROWS; i++)
+            assert_int_equal(table[t].rough_impulses(&pairs, move, 1e9, i, 0x1p50, given), 1);
+        /* 88 terms of at most 6, a chain of 11 and some roundings of each */
+        for (size_t i = 0; i < ROWS * 4; i++) {
+            assert_true(i % 4 == 3 ? rough[i] == move[i]
+                                   : fabs((double)rough[i] - want[i / 4][i % 4]) <
+                                         88.0 * 6.0 * 20.0 * 0x1p-24);
+            assert_true(i % 4 == 3 ? given[i] == 0
+                                   : fabs((double)given[i] - impulse[i / 4][i % 4]) <
+                                         1e9 * 88.0 * 6.0 * 6.0 * 0x1p-24);
+        }
+        if (t == 0) {
+            memcpy(first, rough, sizeof first);
+            memcpy(first_given, given, sizeof given);
+        }
+        check_same_bits(first, rough, ROWS * 4, "roughness");
+        assert_memory_equal(first_given, given, sizeof given);
+        assert_int_equal(table[t].rough_impulses(&pairs, move, 1e9, 0, 1.0, given), 0);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -1294,6 +1363,7 @@ int main(void)
         cmocka_unit_test(an_impulse_that_does_not_fit_is_told_on_every_cpu),
         cmocka_unit_test(kept_gradients_are_those_that_are_not_0_on_every_cpu),
         cmocka_unit_test(pressure_impulses_equal_doubles_and_have_the_same_bits_on_every_cpu),
+        cmocka_unit_test(roughness_equals_doubles_and_has_the_same_bits_on_every_cpu),
         cmocka_unit_test(the_spline_equals_doubles_and_has_the_same_bits_on_every_cpu),
         cmocka_unit_test(sweeps_equal_doubles_and_have_the_same_bits_on_every_cpu),
     };

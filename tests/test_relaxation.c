@@ -437,7 +437,8 @@ static void open_random(world *w, int d, int32_t threads, uint32_t cpu_disable, 
     (void)snprintf(
         more, sizeof more,
         ",\"divergence\":[0.5,0.5,0.5],\"repulsion\":{\"distance\":%s,\"stiffness\":0.5},"
-        "\"guess\":\"guess\",\"rounds\":{\"most\":4,\"above\":0.1}",
+        "\"hyperviscosity\":{\"shares\":[0.5,0.3],\"below\":1},\"guess\":\"guess\",\"rounds\":{"
+        "\"most\":4,\"above\":0.1}",
         model_number(0.25 * spacing));
     const model_random network = {.seed = 3,
                                   .dimension = d,
@@ -572,8 +573,11 @@ static void a_steady_step_allocates_nothing_even_with_moving_walls(void **state)
     const int side[3] = {8, 8, 8};
     world w;
     open_context(&w, &options);
-    check_good(&w,
-               load_pbf(w.context, 3, -9.81, relaxation_text(3, 4, ",\"contact\":0.02"), &w.model));
+    check_good(&w, load_pbf(w.context, 3, -9.81,
+                            relaxation_text(3, 4,
+                                            ",\"contact\":0.02,\"hyperviscosity\":"
+                                            "{\"shares\":[0.5,0.5],\"below\":0.1}"),
+                            &w.model));
     open_set(&w, 3);
     add_fluid(&w, lattice(3, side, spacing, 0.5 * spacing, x), x, NULL, NULL);
     const size_t walls = add_floor(&w, 0.4, 0.7 * spacing, 1);
@@ -600,7 +604,10 @@ static void without_memory_a_step_fails_and_changes_nothing(void **state)
         world w;
         open_context(&w, &options);
         check_good(&w, load_pbf(w.context, 3, -9.81,
-                                relaxation_text(3, 4, ",\"divergence\":[0.5,0.5]"), &w.model));
+                                relaxation_text(3, 4,
+                                                ",\"divergence\":[0.5,0.5],\"hyperviscosity\":"
+                                                "{\"shares\":[0.5,0.5],\"below\":0.1}"),
+                                &w.model));
         open_set(&w, 3);
         add_fluid(&w, lattice(3, side, 0.8 * spacing, 0.5 * spacing, x), x, NULL, NULL);
         add_floor(&w, 0.2, 0.7 * spacing, 1);
@@ -897,6 +904,124 @@ static void scenes_of_any_density_end_in_bounded_corrections(void **state)
     assert_true(fastest < 30.0);
 }
 
+/* ---- Hyperviscosity ---- */
+
+static const char *viscosity_text(const char *shares, double below)
+{
+    static char text[128];
+    (void)snprintf(text, sizeof text, ",\"hyperviscosity\":{\"shares\":[%s],\"below\":%s}", shares,
+                   model_number(below));
+    return text;
+}
+
+/* One step of a crowd; its kinetic energy and hash. */
+static double step_of_crowd(uint64_t seed, int d, const char *more, bool unequal, double shift,
+                            uint64_t *hash)
+{
+    static double x[200 * 3], v[200 * 3], m[200];
+    world w;
+    dice r = {seed};
+    open_pbf(&w, d, 0.0, 2, more);
+    const double density = dice_uniform(&r, 0.5, 3.0);
+    const size_t n = crowd(&r, d, 150, density, x, v, m, unequal);
+    for (size_t i = 0; i < n * (size_t)d && shift > 0.0; i++)
+        v[i] = shift;
+    add_fluid(&w, n, x, v, m);
+    check_good(&w, ascc_step_run(w.step, w.particles, NULL, 1));
+    check_conserved(&w);
+    ascc_measures s = {.size = sizeof s};
+    check_good(&w, ascc_particles_measure(w.particles, &s));
+    *hash = ascc_particles_hash(w.particles);
+    close_world(&w);
+    return s.kinetic_energy;
+}
+
+/* It is the last that acts on velocities, and 1 - A F A / 2 has no eigenvalue beyond 1. */
+static void a_hyperviscosity_never_adds_energy(void **state)
+{
+    (void)state;
+    double least = 1.0;
+    for (uint64_t seed = 1; seed <= 40; seed++) {
+        static const double belows[] = {0.02, 0.2, 2.0, 20.0};
+        const int d = 2 + (int)(seed % 2);
+        uint64_t hash;
+        const double without = step_of_crowd(seed, d, "", seed % 4 > 1, 0.0, &hash);
+        const char *more = viscosity_text("0.5,0.5,0.5,0.5", belows[seed / 2 % 4]);
+        const double with = step_of_crowd(seed, d, more, seed % 4 > 1, 0.0, &hash);
+        assert_true(with <= without * (1.0 + 1e-6)); /* velocities are floats there */
+        least = fmin(least, with / without);
+    }
+    print_message("# of the energy at least %.3g is left\n", least);
+    assert_true(least < 0.7);
+}
+
+static void water_that_moves_as_one_and_splashes_have_no_viscosity(void **state)
+{
+    (void)state;
+    for (int d = 2; d <= 3; d++) {
+        uint64_t with[3], without[3];
+        (void)step_of_crowd(50, d, "", false, 0.0, &without[0]);
+        (void)step_of_crowd(50, d, viscosity_text("0.5", 1e-5), false, 0.0, &with[0]);
+        assert_true(with[0] == without[0]);
+        (void)step_of_crowd(50, d, viscosity_text("0.5", 10.0), false, 0.0, &with[0]);
+        assert_true(with[0] != without[0]); /* it would have been seen */
+        for (int moves = 0; moves < 2; moves++) {
+            static double x[1000 * 3], v[1000 * 3];
+            const int side[3] = {7, 7, 7};
+            for (int k = 0; k < 2; k++) {
+                world w;
+                open_pbf(&w, d, 0.0, 4, k ? viscosity_text("0.5,0.5", 10.0) : "");
+                const size_t n = lattice(d, side, 0.94 * spacing, 0.0, x);
+                for (size_t i = 0; i < n * (size_t)d; i++)
+                    v[i] = moves ? 0.7 : 0.0;
+                add_fluid(&w, n, x, v, NULL);
+                check_good(&w, ascc_step_run(w.step, w.particles, NULL, 2));
+                assert_true(statistics_of(&w).compression_before.largest == 0.0);
+                (k ? with : without)[1 + moves] = ascc_particles_hash(w.particles);
+                close_world(&w);
+            }
+            assert_true(with[1 + moves] == without[1 + moves]);
+        }
+    }
+}
+
+/* A chequered motion is the roughest there is: A takes 2 of it but for the surface, so half of A^2 all. */
+static void rough_motion_ends_and_smooth_motion_stays(void **state)
+{
+    (void)state;
+    for (int d = 2; d <= 3; d++) {
+        static double x[5000 * 3], v[5000 * 3];
+        const int side[3] = {16, 16, 16};
+        double left[2];
+        for (int smooth = 0; smooth < 2; smooth++) {
+            world w;
+            open_pbf(&w, d, 0.0, 4, viscosity_text("0.5", 1.0));
+            const double apart = spacing * pow(0.8, 1.0 / d) * 1.01;
+            const size_t n = lattice(d, side, apart, 0.0, x);
+            double before = 0.0, after = 0.0;
+            for (size_t i = 0; i < n; i++) {
+                double sum = 0.0;
+                for (int c = 0; c < d; c++)
+                    sum += round(x[i * (size_t)d + (size_t)c] / apart + 0.5 * (c != 1));
+                memset(v + i * (size_t)d, 0, (size_t)d * sizeof *v);
+                v[i * (size_t)d] = 1e-3 * (smooth ? x[i * (size_t)d + 1] / (16.0 * apart)
+                                                  : 1.0 - 2.0 * fmod(fabs(sum), 2.0));
+                before += v[i * (size_t)d] * v[i * (size_t)d];
+            }
+            add_fluid(&w, n, x, v, NULL);
+            check_good(&w, ascc_step_run(w.step, w.particles, NULL, 1));
+            for (size_t i = 0; i < n; i++)
+                for (int c = 0; c < d; c++)
+                    after += pow(ascc_velocity(w.particles, i, c), 2.0);
+            left[smooth] = after / before;
+            close_world(&w);
+        }
+        print_message("# %dD: %.3f of chequered, %.5f of shear\n", d, left[0], left[1]);
+        assert_true(left[0] < 0.5);
+        assert_true(left[1] > 0.99);
+    }
+}
+
 /* ---- The reader ---- */
 
 static void bad_constants_are_refused_by_name(void **state)
@@ -985,8 +1110,28 @@ static void bad_constants_are_refused_by_name(void **state)
          "\"limit\":0.01,\"guess\":\"fluid\"}",
          "one channel"},
     };
+    static const struct {
+        const char *json, *says;
+    } viscosities[] = {{"[0.5]", "hyperviscosity"},
+                       {"{\"below\":0.1}", "shares"},
+                       {"{\"shares\":[0.5,0.6],\"below\":0.1}", "shares"},
+                       {"{\"shares\":[],\"below\":0.1}", "shares"},
+                       {"{\"shares\":[0.5,0],\"below\":0.1}", "shares"},
+                       {"{\"shares\":[0.5]}", "below"},
+                       {"{\"shares\":[0.5],\"below\":-1}", "below"},
+                       {"{\"shares\":[0.5],\"below\":0.1,\"above\":1}", "above"}};
     ascc_context *context = NULL;
     assert_int_equal(ascc_context_create(NULL, &context), ASCC_OK);
+    for (size_t i = 0; i < sizeof viscosities / sizeof *viscosities; i++) {
+        ascc_model *model = NULL;
+        char text[256];
+        (void)snprintf(text, sizeof text, ",\"hyperviscosity\":%s", viscosities[i].json);
+        assert_int_equal(load_pbf(context, 3, 0.0, relaxation_text(3, 4, text), &model),
+                         ASCC_ERROR_FORMAT);
+        (void)ascc_context_message(context, text, sizeof text);
+        if (!strstr(text, viscosities[i].says) || !strstr(text, "hyperviscosity"))
+            fail_msg("%zu: \"%s\" does not tell of %s", i, text, viscosities[i].says);
+    }
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
         ascc_model *model = NULL;
         char text[256];
@@ -1034,6 +1179,9 @@ int main(void)
         cmocka_unit_test(pairs_that_are_too_near_part),
         cmocka_unit_test(coincident_particles_stay_together),
         cmocka_unit_test(scenes_of_any_density_end_in_bounded_corrections),
+        cmocka_unit_test(a_hyperviscosity_never_adds_energy),
+        cmocka_unit_test(water_that_moves_as_one_and_splashes_have_no_viscosity),
+        cmocka_unit_test(rough_motion_ends_and_smooth_motion_stays),
         cmocka_unit_test(bad_constants_are_refused_by_name),
         cmocka_unit_test(a_network_without_output_needs_a_relaxation),
     };

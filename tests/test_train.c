@@ -431,13 +431,16 @@ static void gradients_through_the_relaxation_are_right(void **state)
     double worst = 0.0;
     for (int v = 0; v < 8; v++) {
         const int d = 2 + v % 2;
-        char text[512];
+        char text[768];
         (void)snprintf(text, sizeof text,
                        "{\"support\":%s,\"rest_volume\":%s,\"omega\":[0.5,0.4%s],\"epsilon\":0.1,"
                        "\"limit\":%s%s%s%s}",
                        model_number(2.0 * SPACING),
-                       model_number((v / 4 ? 0.6 : 0.9) * pow(SPACING, d)), v / 2 % 2 ? "" : ",0.5",
-                       model_number((v % 3 ? 0.2 : 0.02) * SPACING),
+                       model_number((v % 5 == 2 ? 1.6
+                                     : v / 4    ? 0.6
+                                                : 0.9) *
+                                    pow(SPACING, d)),
+                       v / 2 % 2 ? "" : ",0.5", model_number((v % 3 ? 0.2 : 0.02) * SPACING),
                        v % 4 ? ",\"divergence\":[0.5,0.5,0.3]" : "",
                        v / 2 % 2 ? ",\"direction\":\"current\"" : "",
                        v % 3 ? ",\"repulsion\":{\"distance\":0.04,\"stiffness\":0.7}" : "");
@@ -447,6 +450,10 @@ static void gradients_through_the_relaxation_are_right(void **state)
         if (v % 2)
             (void)snprintf(text + strlen(text) - 1, sizeof text - strlen(text) + 1,
                            ",\"rounds\":{\"most\":%d,\"above\":0.001}}", 2 + v / 4);
+        if (v % 4 != 1)
+            (void)snprintf(text + strlen(text) - 1, sizeof text - strlen(text) + 1,
+                           ",\"hyperviscosity\":{\"shares\":[0.5%s],\"below\":%s}}",
+                           v / 2 % 2 ? ",0.3" : "", v % 2 ? "20" : "0.5");
         gradient_case c = {.name = "relaxation",
                            .random = everything(1800 + (uint64_t)v, d),
                            .unroll = 1 + v % 3,

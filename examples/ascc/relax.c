@@ -27,9 +27,9 @@ typedef struct relax {
     int32_t dimension; /* of a new one */
     double spacing, time_step;
     bool none, current;
-    double rounds, again;
-    double omega[SWEEPS], divergence[SWEEPS];
-    int omega_count, divergence_count;
+    double rounds, again, below;
+    double omega[SWEEPS], divergence[SWEEPS], viscosity[SWEEPS];
+    int omega_count, divergence_count, viscosity_count;
     /* Lengths in spacings, volume in spacings^dimension. */
     double support, volume, epsilon, limit, repulsion, stiffness, contact;
 } relax;
@@ -44,6 +44,8 @@ static const char help[] =
     "options, lengths in particle spacings\n"
     "  --omega A,B,...       weights of the pressure sweeps (0.5,0.5,0.5,0.5)\n"
     "  --divergence A,B,...  of the divergence sweeps, or none (0.5,0.5,0.5,0.5)\n"
+    "  --hyperviscosity A,.. shares of the sweeps that even out rough velocities, or none (none)\n"
+    "  --below V             m/s: what is rougher stays as it is (0.1)\n"
     "  --rounds N            of pressure sweeps at most, each at the places that the one before "
     "left (1)\n"
     "  --again E             another round follows one that began with an excess of density above "
@@ -99,7 +101,7 @@ static bool read_option(relax *r, const char *name, const char *value)
         {"--spacing", &r->spacing},     {"--dt", &r->time_step},        {"--support", &r->support},
         {"--volume", &r->volume},       {"--epsilon", &r->epsilon},     {"--limit", &r->limit},
         {"--repulsion", &r->repulsion}, {"--stiffness", &r->stiffness}, {"--contact", &r->contact},
-        {"--rounds", &r->rounds},       {"--again", &r->again},
+        {"--rounds", &r->rounds},       {"--again", &r->again},         {"--below", &r->below},
     };
     double number;
     for (size_t i = 0; i < sizeof numbers / sizeof *numbers; i++)
@@ -109,6 +111,8 @@ static bool read_option(relax *r, const char *name, const char *value)
         return read_list(value, r->omega, &r->omega_count) && r->omega_count > 0;
     if (strcmp(name, "--divergence") == 0)
         return read_list(value, r->divergence, &r->divergence_count);
+    if (strcmp(name, "--hyperviscosity") == 0)
+        return read_list(value, r->viscosity, &r->viscosity_count);
     if (strcmp(name, "--new") == 0) {
         const bool good = read_number(value, &number) && (number == 2.0 || number == 3.0);
         r->dimension = good ? (int32_t)number : 0;
@@ -126,10 +130,10 @@ static bool read_option(relax *r, const char *name, const char *value)
 static bool read_arguments(relax *r, int argc, char **argv)
 {
     static const char *const options[] = {
-        "--spacing",    "--dt",        "--support",   "--volume",  "--epsilon",
-        "--limit",      "--repulsion", "--stiffness", "--contact", "--omega",
-        "--divergence", "--new",       "--name",      "-o",        "--none",
-        "--current",    "--rounds",    "--again",     NULL};
+        "--spacing",   "--dt",        "--support", "--volume", "--epsilon",    "--limit",
+        "--repulsion", "--stiffness", "--contact", "--omega",  "--divergence", "--hyperviscosity",
+        "--new",       "--name",      "-o",        "--none",   "--current",    "--below",
+        "--rounds",    "--again",     NULL};
     for (int i = 0; i < argc; i++) {
         if (strcmp(argv[i], "--none") == 0) {
             r->none = true;
@@ -171,6 +175,11 @@ static json_t *relaxation_of(const relax *r, int32_t dimension, double spacing)
     json_object_set_new(o, "limit", json_real(r->limit * spacing));
     if (r->divergence_count)
         json_object_set_new(o, "divergence", list_of(r->divergence, r->divergence_count));
+    if (r->viscosity_count)
+        json_object_set_new(o, "hyperviscosity",
+                            json_pack("{s:o,s:f}", "shares",
+                                      list_of(r->viscosity, r->viscosity_count), "below",
+                                      r->below));
     if (r->rounds != 1.0)
         json_object_set_new(
             o, "rounds", json_pack("{s:I,s:f}", "most", (json_int_t)r->rounds, "above", r->again));
@@ -311,6 +320,7 @@ int ascc_command_relax(int argc, char **argv)
                .stiffness = 0.5,
                .rounds = 1.0,
                .again = 0.2,
+               .below = 0.1,
                .contact = 0.4};
     if (!read_arguments(&r, argc, argv))
         return 2;

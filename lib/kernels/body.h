@@ -1213,6 +1213,68 @@ static int pressure_impulses(const ascc_gradients *pairs, const ascc_pressures *
     return good;
 }
 
+/* Differences of the velocities of a row and of its pairs, by |g|^2 and the smaller coefficient of both. */
+static inline void weighted_differences(const ascc_gradients *pairs, size_t k, const float *row,
+                                        const float *move, vector difference[3])
+{
+    const float *from[LANES];
+    vector v[4], square = fill(0.0f);
+    for (size_t l = 0; l < LANES; l++)
+        from[l] = move + (size_t)pairs->neighbor[k + l] * 4;
+    load_quads(from, v);
+    for (size_t c = 0; c < 3; c++) {
+        const vector g = load(pairs->g[c] + k);
+        square = fused(g, g, square);
+    }
+    const vector weight = times(square, smaller(fill(row[3]), v[3]));
+    for (size_t c = 0; c < 3; c++)
+        difference[c] = times(weight, minus(fill(row[c]), v[c]));
+}
+
+static void roughness(const ascc_gradients *pairs, size_t begin, size_t end, const float *move,
+                      float *rough)
+{
+    for (size_t i = begin; i < end; i++) {
+        vector x = fill(0.0f), y = x, z = x, d[3];
+        for (size_t k = pairs->start[i]; k < pairs->end[i]; k += LANES) {
+            weighted_differences(pairs, k, move + i * 4, move, d);
+            x = add(x, d[0]);
+            y = add(y, d[1]);
+            z = add(z, d[2]);
+        }
+        store_totals(rough + i * 4, x, y, z);
+        rough[i * 4 + 3] = move[i * 4 + 3];
+    }
+}
+
+static int rough_impulses(const ascc_gradients *pairs, const float *rough, double factor,
+                          size_t row, double limit, int64_t *sum)
+{
+    int good = 1;
+    for (size_t k = pairs->start[row]; k < pairs->end[row]; k += ASCC_PAIR_BATCH) {
+        const size_t stop =
+            pairs->end[row] - k < ASCC_PAIR_BATCH ? pairs->end[row] : k + ASCC_PAIR_BATCH;
+        uint32_t near[ASCC_PAIR_BATCH + LANES];
+        float term[3][ASCC_PAIR_BATCH + LANES];
+        double impulse[3][ASCC_PAIR_BATCH];
+        size_t n = 0;
+        for (size_t i = k; i < stop; i += LANES) {
+            const kept after = kept_lanes(above(pairs->neighbor + i, (uint32_t)row));
+            vector d[3];
+            weighted_differences(pairs, i, rough + row * 4, rough, d);
+            store_kept_integers(near + n, pairs->neighbor + i, after);
+            for (size_t c = 0; c < 3; c++)
+                store_kept(term[c] + n, d[c], after);
+            n += after.count;
+        }
+        for (size_t c = 0; c < 3; c++)
+            for (size_t i = 0; i < n; i++)
+                impulse[c][i] = (double)term[c][i] * -factor;
+        good &= add_impulses(impulse, limit, near, n, sum + row * 4, sum);
+    }
+    return good;
+}
+
 /* ---- The way back, in training ---- */
 
 /* One pair, `vectors` vectors of its row. */
@@ -1290,6 +1352,8 @@ void ASCC_VARIANT(ascc_kernels *kernels)
     kernels->keep_gradients = keep_gradients;
     kernels->push = push;
     kernels->divergence = divergence;
+    kernels->roughness = roughness;
+    kernels->rough_impulses = rough_impulses;
     kernels->pressure_impulses = pressure_impulses;
     kernels->scatter = scatter;
     kernels->dot = dot;

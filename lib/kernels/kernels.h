@@ -189,6 +189,17 @@ typedef struct ascc_kernels {
     int (*pressure_impulses)(const ascc_gradients *pairs, const ascc_pressures *pressures,
                              size_t row, double limit, int64_t *sum);
 
+    /* Of rows [begin, end): rough[i][c] = sum over pairs of coefficient |g|^2 (move[i] - move[neighbor])[c], the
+     * coefficient the smaller of both rows' fourth numbers of move, which rough takes over. 8 partial sums by
+     * pair mod 8. Rows of move and rough are 4 wide. */
+    void (*roughness)(const ascc_gradients *pairs, size_t begin, size_t end, const float *move,
+                      float *rough);
+
+    /* Pairs of a row with neighbours after it: impulses factor coefficient |g|^2 (rough[neighbor] - rough[row]),
+     * the coefficient as of roughness, added and taken as add_impulses does. */
+    int (*rough_impulses)(const ascc_gradients *pairs, const float *rough, double factor,
+                          size_t row, double limit, int64_t *sum);
+
     /* Of the way back: gradient[neighbor[i]][a] += sum over members m of factor[m * stride + i] *
      * column[m][a], pairs in order; members come in bumps of so many harmonics, and a bump whose
      * first factor is 0 is left out. */

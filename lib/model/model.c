@@ -257,7 +257,8 @@ ascc_status ascc_model_get_info(const ascc_model *model, ascc_model_info *info)
         .conserves_angular_momentum =
             antisymmetric && plan->output.central &&
             (plan->advection == ASCC_ADVECT_NONE || plan->output.current_direction) &&
-            (!plan->relaxation.pressure.count || plan->relaxation.current_direction),
+            (!plan->relaxation.pressure.count ||
+             (plan->relaxation.current_direction && !plan->relaxation.viscosity.count)),
         .advected = plan->advection != ASCC_ADVECT_NONE,
         .neighbor_limit = ascc_plan_neighbor_limit(plan),
         .parameter_count = plan->parameter_count,

@@ -138,6 +138,8 @@ typedef struct ascc_sweeps {
 typedef struct ascc_relaxation {
     ascc_sweeps pressure; /* none = there is no relaxation */
     ascc_sweeps divergence;
+    ascc_sweeps viscosity;       /* of roughness: how much of its roughness each sweep takes */
+    double viscosity_below;      /* what is rougher than this is left alone, m/s */
     int32_t rounds;              /* of pressure sweeps at most: 1 or more */
     double again;                /* another one follows one that began with an excess above this */
     double epsilon;              /* of the lattice's response, added to each particle's own */

@@ -83,19 +83,27 @@ static bool settles(const ascc_sweeps *sweeps)
     return true;
 }
 
-static void read_sweeps(ascc_reader *reader, uint32_t object, const char *key, ascc_sweeps *sweeps)
+/* The length of a list of sweeps; 0 if it is none. */
+static int32_t count_sweeps(ascc_reader *reader, uint32_t object, const char *key)
 {
     const uint32_t list = ascc_reader_array(reader, object, key);
     int32_t count = 0;
     if (reader->status != ASCC_OK)
-        return;
+        return 0;
     for (uint32_t i = ascc_json_first(reader->json, list); i != 0; i = reader->json->value[i].next)
         count++;
-    if (count < 1 || count > ASCC_MAX_SWEEPS) {
-        ascc_reader_fail(reader, "'%s' must have a number for each sweep, 1 to %d of them", key,
-                         ASCC_MAX_SWEEPS);
+    if (count >= 1 && count <= ASCC_MAX_SWEEPS)
+        return count;
+    ascc_reader_fail(reader, "'%s' must have a number for each sweep, 1 to %d of them", key,
+                     ASCC_MAX_SWEEPS);
+    return 0;
+}
+
+static void read_sweeps(ascc_reader *reader, uint32_t object, const char *key, ascc_sweeps *sweeps)
+{
+    const int32_t count = count_sweeps(reader, object, key);
+    if (count == 0)
         return;
-    }
     ascc_reader_numbers(reader, object, key, count, 1e-3, LARGEST_OMEGA, sweeps->omega);
     sweeps->count = count;
     if (reader->status == ASCC_OK && !settles(sweeps))
@@ -103,6 +111,20 @@ static void read_sweeps(ascc_reader *reader, uint32_t object, const char *key, a
                          "sweeps of these numbers '%s' would not settle; if all are the same, 0.5 "
                          "is the most",
                          key);
+}
+
+/* Each sweep is at most a half: then none adds energy, whatever the velocities. */
+static void read_viscosity(ascc_reader *reader, uint32_t object, ascc_relaxation *r)
+{
+    const uint32_t o = ascc_reader_object(reader, object, "hyperviscosity");
+    ascc_reader_where(reader, "relaxation 'hyperviscosity'");
+    const int32_t count = count_sweeps(reader, o, "shares");
+    if (count > 0)
+        ascc_reader_numbers(reader, o, "shares", count, 1e-3, 0.5, r->viscosity.omega);
+    r->viscosity.count = count;
+    r->viscosity_below = ascc_reader_number(reader, o, "below", 1e-6, 1e6);
+    ascc_reader_end(reader, o);
+    ascc_reader_where(reader, "relaxation");
 }
 
 /* The value that pressures begin with. */
@@ -146,6 +168,8 @@ void ascc_relaxation_read(ascc_reader *reader, uint32_t object, ascc_plan_builde
     r.limit = ascc_reader_number(reader, o, "limit", 1e-6 * r.support, r.support);
     if (ascc_reader_has(reader, o, "divergence"))
         read_sweeps(reader, o, "divergence", &r.divergence);
+    if (ascc_reader_has(reader, o, "hyperviscosity"))
+        read_viscosity(reader, o, &r);
     if (ascc_reader_has(reader, o, "rounds"))
         read_rounds(reader, o, &r);
     if (ascc_reader_has(reader, o, "direction"))

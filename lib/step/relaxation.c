@@ -14,6 +14,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "hyperviscosity.h"
 #include "relaxation_pairs.h"
 
 #define ROWS 256 /* of a block of work */
@@ -43,6 +44,7 @@ typedef struct relaxation {
     float *own[3];                                       /* sum of g, walls included */
     float *push[3];                                      /* the same by weight */
     float *excess, *response, *pressure, *change, *move; /* move: rows of 4 */
+    float *smoothing;                                    /* of a hyperviscosity, if there is one */
     uint8_t *near;       /* rows with neighbours within the repulsion */
     const float *guess;  /* [count] pressures times D_lattice; NULL = 0 */
     const double *place; /* [count][3] before the step, if corrections lie along those lines */
@@ -134,6 +136,11 @@ static bool lend_memory(relaxation *r)
     r->neighbor = room_for(r, pairs, sizeof *r->neighbor);
     r->scratch = ascc_arena_lend(arena, slots * r->room, 4 * sizeof *r->scratch);
     memcpy(r->push, r->own, sizeof r->push);
+    if (r->slows && r->constants->viscosity.count) {
+        r->smoothing = room_for(r, n, sizeof *r->smoothing);
+        if (!r->smoothing)
+            return false;
+    }
     if (!r->sum.uniform) {
         r->weight = room_for(r, pairs, sizeof *r->weight);
         if (!r->weight || !vector_room(r, r->push, n))
@@ -163,21 +170,6 @@ static bool find_place(relaxation *r, size_t i)
     return true;
 }
 
-/* The velocity as it is now, in supports a step. */
-static void find_velocity(relaxation *r, size_t i)
-{
-    const ascc_particles *p = r->state->particles;
-    const size_t d = (size_t)p->dimension;
-    const size_t row = ascc_hierarchy_host_row(&r->state->hierarchy, ASCC_SET_FLUID, i);
-    const double unit =
-        r->state->motion->time_step * p->quantum * r->state->length_unit / r->constants->support;
-    for (size_t c = 0; c < 4; c++)
-        r->move[i * 4 + c] =
-            c < d && !is_idle(r, i)
-                ? (float)((double)r->state->advance.momentum[row * d + c] * unit / p->mass[row])
-                : 0.0f;
-}
-
 static void find_places(void *data, size_t begin, size_t end, int32_t slot)
 {
     (void)slot;
@@ -188,7 +180,7 @@ static void find_places(void *data, size_t begin, size_t end, int32_t slot)
             return;
         }
     for (size_t i = begin; r->slows && i < end; i++)
-        find_velocity(r, i);
+        ascc_relaxation_velocity(r->state, i, r->move + i * 4);
 }
 
 /* Is there another particle within the repulsion? The row itself is among its neighbours. */
@@ -301,9 +293,19 @@ static void leave_out(relaxation *r, size_t i)
 {
     r->end[i] = r->start[i];
     r->near[i] = 0;
+    if (r->smoothing)
+        r->smoothing[i] = 0.0f;
     r->excess[i] = r->response[i] = 0.0f;
     for (int c = 0; c < 3; c++)
         r->own[c][i] = r->push[c][i] = 0.0f;
+}
+
+/* Of a row with these squares of its gradients: so much that its pairs together take no more than there is, and
+ * nothing at free surfaces. */
+static float smoothing_of(const relaxation *r, size_t i, float squares)
+{
+    const float lattice = (float)r->constants->lattice_response;
+    return r->excess[i] < -ASCC_SURFACE ? 0.0f : 1.0f / (squares > lattice ? squares : lattice);
 }
 
 static void look_around(void *data, size_t begin, size_t end, int32_t slot)
@@ -330,6 +332,8 @@ static void look_around(void *data, size_t begin, size_t end, int32_t slot)
         if (!r->sum.uniform)
             square = weigh(r, i, wall + 1);
         r->excess[i] = (sum[0] + wall[0]) - 1.0f;
+        if (r->smoothing)
+            r->smoothing[i] = smoothing_of(r, i, sum[4]);
         r->response[i] = 1.0f / (square + least);
     }
     if (r->slows)
@@ -641,14 +645,6 @@ static void corrections(const relaxation *r, size_t i, ascc_pair_batch *b, bool 
         turn(r, i, b, term);
 }
 
-/* Quanta per kilogram and support of correction. */
-static double impulse_factor(const relaxation *r)
-{
-    const ascc_step_state *state = r->state;
-    return r->constants->support / state->length_unit / state->motion->time_step /
-           state->particles->quantum;
-}
-
 /* Is one of the pairs with a row that has no turn of its own? */
 static bool touches_idle(const relaxation *r, size_t i)
 {
@@ -667,7 +663,7 @@ static bool evaluate_kept(ascc_pair_sum *sum, size_t i)
     const ascc_gradients pairs = gradients(r);
     const ascc_pressures pressures = {.pressure = r->pressure,
                                       .limit = (float)(r->constants->limit / r->constants->support),
-                                      .factor = impulse_factor(r),
+                                      .factor = ascc_relaxation_quanta(r->state),
                                       .mass = sum->mass,
                                       .uniform = sum->uniform,
                                       .place = r->place};
@@ -680,7 +676,7 @@ static bool evaluate_kept(ascc_pair_sum *sum, size_t i)
 static void evaluate(ascc_pair_sum *sum, size_t i, ascc_pair_batch *b)
 {
     const relaxation *r = sum->data;
-    const double f = impulse_factor(r), factor[4] = {f, f, f, 0.0};
+    const double f = ascc_relaxation_quanta(r->state), factor[4] = {f, f, f, 0.0};
     float term[ASCC_PAIR_BATCH][4];
     double mass[ASCC_PAIR_BATCH];
     corrections(r, i, b, false, term);
@@ -696,7 +692,7 @@ static void evaluate(ascc_pair_sum *sum, size_t i, ascc_pair_batch *b)
 static void evaluate_walls(ascc_pair_sum *sum, size_t i, ascc_pair_batch *b)
 {
     const relaxation *r = sum->data;
-    const double factor = impulse_factor(r) * sum->mass[i];
+    const double factor = ascc_relaxation_quanta(r->state) * sum->mass[i];
     float term[ASCC_PAIR_BATCH][4];
     double impulse[3][ASCC_PAIR_BATCH];
     if (r->pressure[i] == 0.0f)
@@ -865,27 +861,32 @@ ascc_status ascc_stage_relaxation(ascc_step_state *state)
 
 static ascc_status slow_down(ascc_step_state *state, relaxation *r, int64_t *given)
 {
-    const ascc_particles *p = state->particles;
     ascc_status status = given ? open_relaxation(r, state, true) : no_memory(state);
     if (status != ASCC_OK)
         return status;
     status = sweep(r, &r->constants->divergence);
-    if (status == ASCC_OK)
+    if (status == ASCC_OK && r->constants->divergence.count) {
         status = apply(r, given);
-    for (size_t k = 0; status == ASCC_OK && k < p->fluid_count * (size_t)p->dimension; k++)
-        if (__builtin_add_overflow(state->advance.momentum[k], given[k],
-                                   &state->advance.momentum[k]) ||
-            state->advance.momentum[k] > ASCC_MOMENTUM_LIMIT ||
-            state->advance.momentum[k] < -ASCC_MOMENTUM_LIMIT)
-            return ascc_fail(state->tools.message, ASCC_ERROR_RANGE,
-                             "fluid particle %" PRIu64 ": momentum too large to hold",
-                             p->id[k / (size_t)p->dimension]);
-    return status;
+        if (status == ASCC_OK)
+            status = ascc_relaxation_add(state, given);
+    }
+    if (status != ASCC_OK || !r->smoothing)
+        return status;
+    const ascc_smoothing smoothing = {.state = state,
+                                      .pairs = gradients(r),
+                                      .rows = r->rows,
+                                      .sum = &r->sum,
+                                      .coefficient = r->smoothing,
+                                      .count = r->count,
+                                      .trace = r->trace,
+                                      .given = given};
+    return ascc_smooth_velocities(&smoothing);
 }
 
 ascc_status ascc_stage_divergence(ascc_step_state *state)
 {
-    if (!state->network->plan->relaxation.divergence.count || ascc_step_is_empty(state))
+    const ascc_relaxation *constants = &state->network->plan->relaxation;
+    if (!(constants->divergence.count || constants->viscosity.count) || ascc_step_is_empty(state))
         return ASCC_OK;
     const ascc_arena_mark mark = ascc_arena_mark_of(state->tools.arena);
     relaxation r;

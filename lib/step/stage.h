@@ -63,6 +63,10 @@ typedef struct ascc_relaxation_trace {
     float *change;       /* [sweep][row] */
     float *push;         /* [sweep][row][4] by the pressures before it */
     bool guessed;        /* else the first sweep begins with 0 and changes nothing */
+    /* Of a hyperviscosity: */
+    const float *coefficient; /* [row] NULL = there is none */
+    float *smoothed,
+        *rough; /* [sweep][row][4] velocities that it began with; how rough they were */
 } ascc_relaxation_trace;
 
 /* What a round of the relaxation began with. */

@@ -14,6 +14,8 @@
 #include <math.h>
 #include <string.h>
 
+#include "hyperviscosity_reverse.h"
+
 /* What a sweep leaves with a row: (c_i + c_j) times the difference of moves, and likewise of pushes. */
 typedef struct side {
     float move[3], by_change;
@@ -48,6 +50,8 @@ typedef struct reverse {
     side *side;           /* [row][sides] */
     size_t sides, used;
     head *head; /* [row] */
+    /* Of squares of the pairs' gradients, from a hyperviscosity: [row] of their sums, [pair]; else NULL. */
+    const float *by_squares, *by_square;
     /* Gradients, [row], [row][3] or rows of 4: */
     float *by_pressure, *by_change, *by_excess, *by_response, *by_push, *divergence;
     float *by;         /* of the corrections */
@@ -341,6 +345,7 @@ static void fill_heads(const reverse *r, bool densities)
         to->twice = -2.0f * r->by_response[i] * t->response[i] * t->response[i];
         for (int c = 0; c < 3; c++)
             to->response[c] = to->twice * t->own[c][i];
+        to->twice += r->by_squares ? 2.0f * r->by_squares[i] : 0.0f;
         to->density = densities ? r->by_excess[i] : 0.0f;
     }
 }
@@ -358,22 +363,25 @@ static void add_sides(const side *restrict a, const side *restrict b, size_t cou
     }
 }
 
-static void pass_pairs(const reverse *r, size_t i, batch *b)
+/* pair: how many pairs came before. */
+static void pass_pairs(const reverse *r, size_t i, batch *b, size_t *pair)
 {
     const side *own = r->side + i * r->sides;
     const head *here = &r->head[i];
     for (size_t at = r->trace->pairs.start[i]; next_pairs(r, i, &at, b);)
-        for (size_t k = 0; k < b->count; k++) {
+        for (size_t k = 0; k < b->count; k++, (*pair)++) {
             const size_t j = b->neighbor[k];
             const head *there = &r->head[j];
             const float u[3] = {b->x[k], b->y[k], b->z[k]};
+            const float own_square = r->by_square ? 2.0f * r->by_square[*pair] : 0.0f;
             float by[3], by_difference[3];
             for (int c = 0; c < 3; c++)
                 by[c] = here->response[c] - there->response[c];
             add_sides(own, r->side + j * r->sides, r->used, by);
             bend(u, -b->curvature[k], -b->slope[k] / b->distance[k], by, by_difference);
-            const float radial = b->slope[k] * (b->curvature[k] * (here->twice + there->twice) +
-                                                (here->density + there->density));
+            const float radial =
+                b->slope[k] * (b->curvature[k] * (here->twice + there->twice + own_square) +
+                               (here->density + there->density));
             for (int c = 0; c < 3; c++)
                 by_difference[c] += radial * u[c];
             add_places(r, i, j, by_difference);
@@ -405,9 +413,10 @@ static void pass_walls(const reverse *r, size_t i, batch *b)
 static void geometry_back(const reverse *r, bool densities)
 {
     batch b;
+    size_t pair = 0;
     fill_heads(r, densities);
     for (size_t i = 0; i < r->count; i++) {
-        pass_pairs(r, i, &b);
+        pass_pairs(r, i, &b, &pair);
         if (r->wall_rows->count[i])
             pass_walls(r, i, &b);
     }
@@ -516,6 +525,26 @@ static ascc_status pressure_back(const ascc_step_state *state, ascc_arena *arena
     return ASCC_OK;
 }
 
+/* From the velocities that a hyperviscosity left, also in r->by, to those that it began with. */
+static ascc_status smoothing_back(reverse *r, double *velocity)
+{
+    const size_t pairs = ascc_smoothing_pairs(r->trace, r->count);
+    const ascc_smoothing_gradients gradients = {
+        .velocity = r->by,
+        .by_squares = zeros(r, 1),
+        .by_square = ascc_arena_take(r->arena, pairs, sizeof *gradients.by_square)};
+    if (!gradients.by_squares || !gradients.by_square)
+        return ASCC_ERROR_MEMORY;
+    r->by_squares = gradients.by_squares;
+    r->by_square = gradients.by_square;
+    const ascc_status status = ascc_smoothing_backward(r->state, r->arena, &gradients);
+    for (size_t i = 0; i < r->count; i++)
+        for (size_t c = 0; c < r->d; c++)
+            velocity[host_row(r, i) * r->d + c] =
+                (double)r->by[i * 4 + c] * r->unit * r->state->motion->time_step;
+    return status;
+}
+
 /* v' = v + d / dt with d from the divergence of v dt at the positions that the step leaves. */
 static ascc_status divergence_back(const ascc_step_state *state, ascc_arena *arena,
                                    const ascc_relaxation_gradients *gradients)
@@ -526,6 +555,8 @@ static ascc_status divergence_back(const ascc_step_state *state, ascc_arena *are
                       state->relaxed.round[state->relaxed.rounds - 1].rows[1]))
         return ASCC_ERROR_MEMORY;
     gather_by(&r, gradients->velocity, NULL);
+    if (trace->coefficient && smoothing_back(&r, gradients->velocity) != ASCC_OK)
+        return ASCC_ERROR_MEMORY;
     apply_back(&r);
     sweeps_back(&r);
     side *to = next_side(&r);

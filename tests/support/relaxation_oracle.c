@@ -156,6 +156,57 @@ static void relax_velocities(scene *s, double step, double *velocity)
             velocity[i * s->d + c] += s->move[i][c] / step;
 }
 
+/* How rough velocities are (docs/method.md), of pairs of these coefficients. */
+static void roughness(const scene *s, const double coefficient[MOST],
+                      const double velocity[MOST][3], double rough[MOST][3])
+{
+    for (size_t i = 0; i < s->fluid; i++) {
+        memset(rough[i], 0, sizeof rough[i]);
+        for (size_t k = 0; k < s->fluid; k++) {
+            double square = 0.0;
+            for (size_t c = 0; c < 3; c++)
+                square += s->g[i][k][c] * s->g[i][k][c];
+            for (size_t c = 0; c < 3; c++)
+                rough[i][c] += fmin(coefficient[i], coefficient[k]) * square *
+                               (velocity[i][c] - velocity[k][c]);
+        }
+    }
+}
+
+static void smooth_velocities(const scene *s, double step, double *velocity)
+{
+    const ascc_relaxation *r = s->constants;
+    double coefficient[MOST] = {0.0}, v[MOST][3] = {{0.0}}, rough[MOST][3], twice[MOST][3];
+    for (size_t i = 0; i < s->fluid; i++) {
+        double squares = 0.0;
+        for (size_t k = 0; k < s->fluid; k++)
+            for (size_t c = 0; c < 3; c++)
+                squares += s->g[i][k][c] * s->g[i][k][c];
+        if (s->density[i] - 1.0 >= -0.35)
+            coefficient[i] = 1.0 / fmax(squares, r->lattice_response);
+        for (size_t c = 0; c < s->d; c++)
+            v[i][c] = velocity[i * s->d + c] * step;
+    }
+    for (int32_t n = 0; n < r->viscosity.count; n++) {
+        roughness(s, coefficient, v, rough);
+        for (size_t i = 0; i < s->fluid; i++) {
+            double square = 0.0;
+            for (size_t c = 0; c < 3; c++)
+                square += rough[i][c] * rough[i][c];
+            const double left = fmax(0.0, 1.0 - square / pow(r->viscosity_below * step, 2.0));
+            for (size_t c = 0; c < 3; c++)
+                rough[i][c] *= left * left;
+        }
+        roughness(s, coefficient, rough, twice);
+        for (size_t i = 0; i < s->fluid; i++)
+            for (size_t c = 0; c < 3; c++)
+                v[i][c] -= r->viscosity.omega[n] * twice[i][c];
+    }
+    for (size_t i = 0; i < s->fluid; i++)
+        for (size_t c = 0; c < s->d; c++)
+            velocity[i * s->d + c] = v[i][c] / step;
+}
+
 void relaxation_oracle(const ascc_plan *plan, size_t fluid, size_t walls, const double *wall,
                        const double *before, const double *guess, double *position,
                        double *velocity)
@@ -203,5 +254,7 @@ void relaxation_oracle(const ascc_plan *plan, size_t fluid, size_t walls, const 
     }
     if (r->divergence.count)
         relax_velocities(s, step, velocity);
+    if (r->viscosity.count)
+        smooth_velocities(s, step, velocity);
     free(s);
 }

@@ -1,0 +1,226 @@
+/* Sweeps of a hyperviscosity. SPDX-License-Identifier: MIT
+ *
+ * With w_ij = min(s_i, s_j) |g_ij|^2, s_i = 1 / max(sum_j |g_ij|^2, D_lattice), 0 at free surfaces, and masses 1:
+ *
+ *     R_i = sum_j w_ij (v_i - v_j)                      how much rougher v_i is than those around it
+ *     R_i = R_i max(0, 1 - |R_i|^2 / below^2)^2         a splash is left alone
+ *     v_i = v_i - share sum_j w_ij (R_i - R_j)
+ *
+ * The matrix of the first line, A, is symmetric with eigenvalues in [0, 2], and the second line is a diagonal F in
+ * [0, 1]: so 1 - share A F A adds no energy for shares of at most a half. Of unequal masses the same holds with
+ * min(m_i s_i, m_j s_j) and what each row receives divided by its mass.
+ */
+#include "hyperviscosity.h"
+
+#include <inttypes.h>
+#include <math.h>
+#include <string.h>
+
+#define ROWS 256 /* of a block of work */
+
+typedef struct sweep {
+    const ascc_smoothing *of;
+    double heaviest, factor; /* kg; quanta per support a step of roughness */
+    float bound;
+    float *velocity, *rough; /* rows of 4, the last the coefficient */
+} sweep;
+
+void ascc_relaxation_velocity(const ascc_step_state *state, size_t row, float velocity[4])
+{
+    const ascc_particles *p = state->particles;
+    const size_t d = (size_t)p->dimension;
+    const size_t at = ascc_hierarchy_host_row(&state->hierarchy, ASCC_SET_FLUID, row);
+    const double unit = state->motion->time_step * p->quantum * state->length_unit /
+                        state->network->plan->relaxation.support;
+    const bool moves = !ascc_hierarchy_is_idle(&state->hierarchy, row);
+    for (size_t c = 0; c < 4; c++)
+        velocity[c] =
+            c < d && moves
+                ? (float)((double)state->advance.momentum[at * d + c] * unit / p->mass[at])
+                : 0.0f;
+}
+
+double ascc_relaxation_quanta(const ascc_step_state *state)
+{
+    return state->network->plan->relaxation.support / state->length_unit /
+           state->motion->time_step / state->particles->quantum;
+}
+
+ascc_status ascc_relaxation_add(ascc_step_state *state, const int64_t *given)
+{
+    const ascc_particles *p = state->particles;
+    int64_t *momentum = state->advance.momentum;
+    for (size_t k = 0; k < p->fluid_count * (size_t)p->dimension; k++)
+        if (__builtin_add_overflow(momentum[k], given[k], &momentum[k]) ||
+            momentum[k] > ASCC_MOMENTUM_LIMIT || momentum[k] < -ASCC_MOMENTUM_LIMIT)
+            return ascc_fail(state->tools.message, ASCC_ERROR_RANGE,
+                             "fluid particle %" PRIu64 ": momentum too large to hold",
+                             p->id[k / (size_t)p->dimension]);
+    return ASCC_OK;
+}
+
+double ascc_smoothing_share(const ascc_step_state *state, double share)
+{
+    const double steps =
+        state->motion->time_step * state->time_unit / state->network->plan->time_step;
+    return share * (steps < 1.0 ? steps : 1.0);
+}
+
+float ascc_smoothing_bound(const ascc_step_state *state)
+{
+    const ascc_relaxation *r = &state->network->plan->relaxation;
+    return (float)(r->viscosity_below * state->motion->time_step * state->time_unit / r->support);
+}
+
+/* Of all fluid, that of other processes, too. */
+static ascc_status find_heaviest(const ascc_smoothing *s, double *heaviest)
+{
+    ascc_halo *halo = s->state->halo;
+    *heaviest = 0.0;
+    for (size_t i = 0; i < (s->sum->uniform && s->count ? 1 : s->count); i++)
+        *heaviest = s->sum->mass[i] > *heaviest ? s->sum->mass[i] : *heaviest;
+    return halo && !s->sum->uniform ? ascc_halo_largest(halo, heaviest) : ASCC_OK;
+}
+
+static void velocity_rows(void *data, size_t begin, size_t end, int32_t slot)
+{
+    (void)slot;
+    const sweep *w = data;
+    const ascc_smoothing *s = w->of;
+    for (size_t i = begin; i < end; i++) {
+        ascc_relaxation_velocity(s->state, i, w->velocity + i * 4);
+        w->velocity[i * 4 + 3] =
+            s->sum->uniform ? s->coefficient[i]
+                            : (float)((double)s->coefficient[i] * (s->sum->mass[i] / w->heaviest));
+    }
+}
+
+static void rough_rows(void *data, size_t begin, size_t end, int32_t slot)
+{
+    (void)slot;
+    const sweep *w = data;
+    const ascc_smoothing *s = w->of;
+    s->state->tools.kernels->roughness(&s->pairs, begin, end, w->velocity, w->rough);
+    for (size_t i = begin; !s->sum->uniform && i < end; i++)
+        for (size_t c = 0; c < 3; c++)
+            w->rough[i * 4 + c] *= (float)(w->heaviest / s->sum->mass[i]);
+}
+
+/* One factor a row, so that no sweep adds energy. */
+static void fade_rows(void *data, size_t begin, size_t end, int32_t slot)
+{
+    (void)slot;
+    const sweep *w = data;
+    for (size_t i = begin; i < end; i++) {
+        float *r = w->rough + i * 4;
+        const float square = r[0] * r[0] + r[1] * r[1] + r[2] * r[2];
+        const float left = 1.0f - square / (w->bound * w->bound);
+        const float share = left > 0.0f ? left * left : 0.0f;
+        for (size_t c = 0; c < 3; c++)
+            r[c] *= share;
+    }
+}
+
+/* Pairs with rows before i that have no turn of their own: of other processes; those that sleep have no coefficient. */
+static bool add_idle_pairs(const sweep *w, ascc_pair_sum *sum, size_t i)
+{
+    const ascc_smoothing *s = w->of;
+    const ascc_hierarchy *h = &s->state->hierarchy;
+    const float *here = w->rough + i * 4;
+    bool good = true;
+    for (size_t k = s->pairs.start[i]; h->idle && k < s->pairs.end[i]; k++) {
+        const size_t j = s->pairs.neighbor[k];
+        if (j >= i || !ascc_hierarchy_is_idle(h, j))
+            continue;
+        const float *there = w->rough + j * 4;
+        float square = 0.0f;
+        for (size_t c = 0; c < 3; c++)
+            square = fmaf(s->pairs.g[c][k], s->pairs.g[c][k], square);
+        const float weight = square * (here[3] < there[3] ? here[3] : there[3]);
+        for (size_t c = 0; c < 3; c++) {
+            const double impulse = (double)(weight * (here[c] - there[c])) * -w->factor;
+            int64_t quanta = 0;
+            good &= ascc_round_quanta(&impulse, 1, &quanta);
+            sum->sum[i * sum->stride + c] += quanta;
+        }
+    }
+    return good;
+}
+
+static bool evaluate(ascc_pair_sum *sum, size_t i)
+{
+    const sweep *w = sum->data;
+    const ascc_smoothing *s = w->of;
+    if (!s->state->tools.kernels->rough_impulses(&s->pairs, w->rough, w->factor, i,
+                                                 ASCC_IMPULSE_LIMIT, sum->sum) ||
+        !add_idle_pairs(w, sum, i))
+        ascc_pair_sum_note_bad(sum, i);
+    return true;
+}
+
+/* Sweep k has begun with these velocities and found this roughness. */
+static void trace_sweep(const sweep *w, int32_t k)
+{
+    const ascc_relaxation_trace *t = w->of->trace;
+    const size_t numbers = w->of->count * 4;
+    memcpy(t->smoothed + (size_t)k * numbers, w->velocity, numbers * sizeof *w->velocity);
+    memcpy(t->rough + (size_t)k * numbers, w->rough, numbers * sizeof *w->rough);
+}
+
+static ascc_status smooth(sweep *w, int32_t k)
+{
+    const ascc_smoothing *s = w->of;
+    ascc_step_state *state = s->state;
+    ascc_workers *workers = state->tools.workers;
+    const ascc_impulses to = {s->given, NULL};
+    const ascc_halo_rows velocity = {w->velocity, 4 * sizeof *w->velocity};
+    const ascc_halo_rows rough = {w->rough, 4 * sizeof *w->rough};
+    uint64_t pairs;
+    w->factor = ascc_smoothing_share(state, state->network->plan->relaxation.viscosity.omega[k]) *
+                ascc_relaxation_quanta(state) * w->heaviest;
+    ascc_workers_run(workers, s->count, 4 * ROWS, velocity_rows, w);
+    ascc_status status = ascc_hierarchy_refresh(&state->hierarchy, ASCC_SET_FLUID, &velocity, 1);
+    if (status != ASCC_OK)
+        return status;
+    ascc_workers_run(workers, s->count, ROWS, rough_rows, w);
+    if (s->trace)
+        trace_sweep(w, k);
+    ascc_workers_run(workers, s->count, 4 * ROWS, fade_rows, w);
+    status = ascc_hierarchy_refresh(&state->hierarchy, ASCC_SET_FLUID, &rough, 1);
+    if (status != ASCC_OK)
+        return status;
+    memset(s->sum->sum, 0, s->count * s->sum->stride * sizeof *s->sum->sum);
+    s->sum->data = w;
+    s->sum->whole = evaluate;
+    ascc_pair_sum_run(s->sum, s->rows, NULL);
+    status = ascc_pair_sum_give(s->sum, w->rough, 4, &to, &pairs);
+    return status == ASCC_OK ? ascc_relaxation_add(state, s->given) : status;
+}
+
+static bool keep_sweeps(const ascc_smoothing *s, int32_t sweeps)
+{
+    ascc_relaxation_trace *t = s->trace;
+    const size_t rows = (size_t)sweeps * s->count;
+    if (!t)
+        return true;
+    t->coefficient = s->coefficient;
+    t->smoothed = ascc_arena_take(s->state->tools.arena, rows, 4 * sizeof *t->smoothed);
+    t->rough = ascc_arena_take(s->state->tools.arena, rows, 4 * sizeof *t->rough);
+    return t->smoothed && t->rough;
+}
+
+ascc_status ascc_smooth_velocities(const ascc_smoothing *s)
+{
+    ascc_arena *arena = s->state->tools.arena;
+    const int32_t sweeps = s->state->network->plan->relaxation.viscosity.count;
+    sweep w = {.of = s,
+               .bound = ascc_smoothing_bound(s->state),
+               .velocity = ascc_arena_lend(arena, s->count, 4 * sizeof *w.velocity),
+               .rough = ascc_arena_lend(arena, s->count, 4 * sizeof *w.rough)};
+    if (!w.velocity || !w.rough || !keep_sweeps(s, sweeps))
+        return ascc_fail(s->state->tools.message, ASCC_ERROR_MEMORY, "no memory for a viscosity");
+    ascc_status status = find_heaviest(s, &w.heaviest);
+    for (int32_t k = 0; k < sweeps && status == ASCC_OK; k++)
+        status = smooth(&w, k);
+    return status;
+}
