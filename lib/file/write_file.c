@@ -158,13 +158,7 @@ static bool replace(const char *part, const char *path)
 }
 #endif
 
-typedef struct place {
-    char path[PATH_SIZE];   /* of the file, links followed */
-    char folder[PATH_SIZE]; /* that it lies in */
-    char part[PATH_SIZE];   /* where it is written */
-    unsigned mode;          /* of the file that is there */
-    bool there;
-} place;
+typedef ascc_file_place place;
 
 /* The last part of a path; what goes before names its folder, separator included. */
 static const char *name_of(const char *path)
@@ -251,13 +245,10 @@ static bool synced(int file)
     return result == 0;
 }
 
-/* Writes, syncs and closes. What was synced is not lost by a close that was interrupted. */
-static bool fill(int file, const ascc_bytes *piece, size_t count)
+/* Syncs and closes. What was synced is not lost by a close that was interrupted. */
+static bool complete(int file)
 {
-    bool good = true;
-    for (size_t i = 0; good && i < count; i++)
-        good = write_piece(file, &piece[i]);
-    good = good && synced(file);
+    const bool good = synced(file);
     const int why = errno;
     const bool closed = close(file) == 0 || errno == EINTR;
     if (!good)
@@ -284,34 +275,73 @@ static bool put_in_place(const place *p, const char **why)
     return good;
 }
 
-static bool write_file(const char *path, const ascc_bytes *piece, size_t count, const char **why)
+static ascc_status explain(const char *path, const char *why, ascc_message *message)
 {
-    place p;
-    if (!find_place(&p, path, why))
-        return false;
-    const int file = open_part(&p);
-    if (file < 0)
-        return false;
-    if (p.there)
-        set_mode(file, p.mode);
-    if (fill(file, piece, count) && put_in_place(&p, why))
-        return true;
-    const int reason = errno;
-    discard(p.part); /* not there any more if it has its place */
-    errno = reason;
-    return false;
-}
-
-ascc_status ascc_write_file(const char *path, const ascc_bytes *piece, size_t count,
-                            ascc_message *message)
-{
-    const char *why = NULL;
-    errno = 0;
-    if (write_file(path, piece, count, &why))
-        return ASCC_OK;
     const char *reason = errno ? strerror(errno) : "";
     const size_t length = strlen(path);
     const size_t skipped = length > SHOWN_PATH ? length - SHOWN_PATH : 0;
     return ascc_fail(message, ASCC_ERROR_FILE, "cannot write '%s%s': %s%s%s", skipped ? "..." : "",
                      path + skipped, why ? why : "", why && errno ? ": " : "", reason);
+}
+
+ascc_status ascc_file_begin(ascc_file_writer *file, const char *path, ascc_message *message)
+{
+    const char *why = NULL;
+    errno = 0;
+    file->path = path;
+    file->number = find_place(&file->place, path, &why) ? open_part(&file->place) : -1;
+    if (file->number < 0)
+        return explain(path, why, message);
+    if (file->place.there)
+        set_mode(file->number, file->place.mode);
+    return ASCC_OK;
+}
+
+static void abandon(ascc_file_writer *file)
+{
+    const int reason = errno;
+    if (file->number >= 0)
+        (void)close(file->number);
+    file->number = -1;
+    discard(file->place.part); /* not there any more if it has its place */
+    errno = reason;
+}
+
+ascc_status ascc_file_add(ascc_file_writer *file, const void *data, size_t size,
+                          ascc_message *message)
+{
+    const ascc_bytes piece = {data, size};
+    errno = 0;
+    if (write_piece(file->number, &piece))
+        return ASCC_OK;
+    abandon(file);
+    return explain(file->path, NULL, message);
+}
+
+ascc_status ascc_file_finish(ascc_file_writer *file, ascc_message *message)
+{
+    const char *why = NULL;
+    errno = 0;
+    const bool good = complete(file->number);
+    file->number = -1;
+    if (good && put_in_place(&file->place, &why))
+        return ASCC_OK;
+    abandon(file);
+    return explain(file->path, why, message);
+}
+
+void ascc_file_drop(ascc_file_writer *file)
+{
+    if (file->number >= 0)
+        abandon(file);
+}
+
+ascc_status ascc_write_file(const char *path, const ascc_bytes *piece, size_t count,
+                            ascc_message *message)
+{
+    ascc_file_writer file;
+    ascc_status status = ascc_file_begin(&file, path, message);
+    for (size_t i = 0; status == ASCC_OK && i < count; i++)
+        status = ascc_file_add(&file, piece[i].data, piece[i].size, message);
+    return status == ASCC_OK ? ascc_file_finish(&file, message) : status;
 }

@@ -1,4 +1,5 @@
 /* Snapshot, restore and hash of a particle set. SPDX-License-Identifier: MIT */
+#include "snapshot.h"
 #include "base/words.h"
 #include "bodies.h"
 #include "rotation.h"
@@ -18,10 +19,8 @@
  *   bodies.h), the next body's number, the number of bodies,
  *   checksum of all before
  */
-#define SNAPSHOT_MAGIC UINT64_C(0x50414e5343435341) /* the bytes "ASCCSNAP" */
-#define SNAPSHOT_HEADER 9
 #define PAST_SHIFT 32
-#define SNAPSHOT_FRAME (SNAPSHOT_HEADER + 1) /* and the checksum */
+#define SNAPSHOT_FRAME (ASCC_SNAPSHOT_HEAD + 1) /* and the checksum */
 #define BODY_WORDS (4 + ASCC_BODY_NUMBERS)
 #define BODIES_FRAME 2 /* after the bodies, from version 3 on */
 
@@ -35,13 +34,18 @@ static size_t row_words(ascc_kind kind, int32_t dimension, int32_t past, size_t 
     return words;
 }
 
+size_t ascc_snapshot_tail_words(const ascc_particles *particles)
+{
+    return particles->body_count * BODY_WORDS + BODIES_FRAME;
+}
+
 static size_t snapshot_words(const ascc_particles *particles)
 {
     const int32_t dimension = particles->dimension, past = particles->past_count;
     return SNAPSHOT_FRAME +
            particles->fluid_count * row_words(ASCC_FLUID, dimension, past, ASCC_FIELD_COUNT) +
            particles->boundary_count * row_words(ASCC_BOUNDARY, dimension, past, ASCC_FIELD_COUNT) +
-           particles->body_count * BODY_WORDS + BODIES_FRAME;
+           ascc_snapshot_tail_words(particles);
 }
 
 size_t ascc_particles_snapshot_size(const ascc_particles *particles)
@@ -99,6 +103,36 @@ static unsigned char *put_body(unsigned char *into, const struct ascc_body *body
     return into;
 }
 
+unsigned char *ascc_snapshot_put_head(const ascc_particles *particles, size_t fluid,
+                                      unsigned char *into)
+{
+    into = put(into, ASCC_SNAPSHOT_MAGIC);
+    into = put(into, ASCC_SNAPSHOT_VERSION | (uint64_t)particles->past_count << PAST_SHIFT);
+    into = put(into, ascc_particles_width(particles));
+    into = put(into, fluid);
+    into = put(into, particles->boundary_count);
+    into = put(into, particles->next_id);
+    into = put(into, ascc_bits_of(particles->spacing));
+    into = put(into, ascc_bits_of(particles->default_mass));
+    return put(into, ascc_bits_of(particles->quantum));
+}
+
+unsigned char *ascc_snapshot_put_numbers(const ascc_particle_field *field, const void *numbers,
+                                         size_t count, unsigned char *into)
+{
+    for (size_t k = 0; k < count; k++)
+        into = put(into, number_word(field, numbers, k));
+    return into;
+}
+
+unsigned char *ascc_snapshot_put_tail(const ascc_particles *particles, unsigned char *into)
+{
+    for (size_t b = 0; b < particles->body_count; b++)
+        into = put_body(into, &particles->bodies[b]);
+    into = put(into, (uint64_t)particles->next_body);
+    return put(into, particles->body_count);
+}
+
 ascc_status ascc_particles_snapshot(const ascc_particles *particles, void *memory, size_t capacity)
 {
     ASCC_FLOAT_SCOPE;
@@ -109,30 +143,18 @@ ascc_status ascc_particles_snapshot(const ascc_particles *particles, void *memor
         return ascc_particles_fail_reading(particles, ASCC_ERROR_ARGUMENT,
                                            "memory: NULL, or its %zu bytes are fewer than %zu",
                                            capacity, size);
-    unsigned char *at = memory;
-    at = put(at, SNAPSHOT_MAGIC);
-    at = put(at, ASCC_SNAPSHOT_VERSION | (uint64_t)particles->past_count << PAST_SHIFT);
-    at = put(at, ascc_particles_width(particles));
-    at = put(at, particles->fluid_count);
-    at = put(at, particles->boundary_count);
-    at = put(at, particles->next_id);
-    at = put(at, ascc_bits_of(particles->spacing));
-    at = put(at, ascc_bits_of(particles->default_mass));
-    at = put(at, ascc_bits_of(particles->quantum));
+    unsigned char *at = ascc_snapshot_put_head(particles, particles->fluid_count, memory);
     for (size_t i = 0; i < ASCC_FIELD_COUNT; i++) {
         const ascc_particle_field *const field = &ascc_particle_fields[i];
-        const unsigned char *const numbers = ascc_field_rows(particles, field);
-        const size_t count =
+        at = ascc_snapshot_put_numbers(
+            field, ascc_field_rows(particles, field),
             ascc_particles_count(particles, field->kind) *
-            (size_t)ascc_field_numbers(field, particles->dimension, particles->past_count);
-        for (size_t k = 0; k < count; k++)
-            at = put(at, number_word(field, numbers, k));
+                (size_t)ascc_field_numbers(field, particles->dimension, particles->past_count),
+            at);
     }
-    for (size_t b = 0; b < particles->body_count; b++)
-        at = put_body(at, &particles->bodies[b]);
-    at = put(at, (uint64_t)particles->next_body);
-    at = put(at, particles->body_count);
-    put(at, ascc_sum_words(SNAPSHOT_MAGIC, memory, (size_t)(at - (unsigned char *)memory) / 8));
+    at = ascc_snapshot_put_tail(particles, at);
+    put(at,
+        ascc_sum_words(ASCC_SNAPSHOT_MAGIC, memory, (size_t)(at - (unsigned char *)memory) / 8));
     return ASCC_OK;
 }
 
@@ -152,59 +174,84 @@ typedef struct snapshot {
     const unsigned char *bodies;
 } snapshot;
 
-/* Reads header and sizes of untrusted bytes. On failure *why says what is wrong. */
-static bool open_snapshot(const unsigned char *bytes, size_t size, snapshot *from, const char **why)
+bool ascc_snapshot_read_head(const unsigned char *head, uint64_t words,
+                             ascc_snapshot_layout *layout, const char **why)
 {
     *why = "not a snapshot";
-    if (size < 8 * SNAPSHOT_FRAME || size % 8 != 0 || ascc_get_word(bytes) != SNAPSHOT_MAGIC)
+    if (words < SNAPSHOT_FRAME || ascc_get_word(head) != ASCC_SNAPSHOT_MAGIC)
         return false;
     *why = "of a version not known here";
-    const uint64_t version = ascc_get_word(bytes + 8), past = version >> PAST_SHIFT;
+    const uint64_t version = ascc_get_word(head + 8), past = version >> PAST_SHIFT;
     const size_t fields = ascc_snapshot_fields(version & UINT32_MAX);
     if (fields == 0 || past > (fields == ASCC_FIELD_COUNT ? ASCC_MAX_HISTORY : 0))
         return false;
-    *why = "damaged: its checksum is wrong";
-    if (ascc_get_word(bytes + size - 8) != ascc_sum_words(SNAPSHOT_MAGIC, bytes, size / 8 - 1))
-        return false;
 
     *why = "of no possible dimension or size";
-    const uint64_t dimension = ascc_get_word(bytes + 16);
-    const uint64_t fluid = ascc_get_word(bytes + 24), boundary = ascc_get_word(bytes + 32);
-    if (dimension != 2 && dimension != 3)
+    const uint64_t dimension = ascc_get_word(head + 16);
+    const uint64_t fluid = ascc_get_word(head + 24), boundary = ascc_get_word(head + 32);
+    if ((dimension != 2 && dimension != 3) || words > SIZE_MAX / 8)
         return false;
-    const unsigned char *const end = bytes + size - 8;
-    size_t words = size / 8 - SNAPSHOT_FRAME;
-    uint64_t bodies = 0, next_body = 0;
-    if (fields > ASCC_FIELD_wall_own_position) {
-        if (words < BODIES_FRAME)
-            return false;
-        words -= BODIES_FRAME;
-        bodies = ascc_get_word(end - 8);
-        next_body = ascc_get_word(end - 16);
-        if (bodies > words / BODY_WORDS || next_body > (uint64_t)INT32_MAX + 1)
-            return false;
-        words -= (size_t)bodies * BODY_WORDS;
-    }
     const size_t fluid_words = row_words(ASCC_FLUID, (int32_t)dimension, (int32_t)past, fields);
     const size_t boundary_words =
         row_words(ASCC_BOUNDARY, (int32_t)dimension, (int32_t)past, fields);
-    if (fluid > words / fluid_words || boundary > words / boundary_words ||
-        (size_t)fluid * fluid_words + (size_t)boundary * boundary_words != words)
+    uint64_t left = words - SNAPSHOT_FRAME;
+    if (fluid > left / fluid_words)
+        return false;
+    left -= fluid * fluid_words;
+    if (boundary > left / boundary_words)
+        return false;
+    left -= boundary * boundary_words;
+    if (fields > ASCC_FIELD_wall_own_position
+            ? left < BODIES_FRAME || (left - BODIES_FRAME) % BODY_WORDS != 0
+            : left != 0)
+        return false;
+    *layout = (ascc_snapshot_layout){.dimension = (int32_t)dimension,
+                                     .past = (int32_t)past,
+                                     .fields = fields,
+                                     .rows = {(size_t)fluid, (size_t)boundary},
+                                     .words = (size_t)words,
+                                     .tail = (size_t)left};
+    return true;
+}
+
+void ascc_snapshot_set_fluid(ascc_snapshot_layout *layout, unsigned char *head, size_t fluid)
+{
+    const size_t words = row_words(ASCC_FLUID, layout->dimension, layout->past, layout->fields);
+    layout->words = layout->words - layout->rows[ASCC_FLUID] * words + fluid * words;
+    layout->rows[ASCC_FLUID] = fluid;
+    ascc_put_word(head + 24, fluid);
+}
+
+/* Reads head and sizes of untrusted bytes. On failure *why says what is wrong. */
+static bool open_snapshot(const unsigned char *bytes, size_t size, snapshot *from, const char **why)
+{
+    ascc_snapshot_layout layout = {0};
+    if (!ascc_snapshot_read_head(bytes, size % 8 == 0 ? size / 8 : 0, &layout, why))
+        return false;
+    *why = "damaged: its checksum is wrong";
+    const unsigned char *const end = bytes + size - 8;
+    if (ascc_get_word(end) != ascc_sum_words(ASCC_SNAPSHOT_MAGIC, bytes, size / 8 - 1))
+        return false;
+    *why = "of no possible dimension or size";
+    const uint64_t bodies = layout.tail ? ascc_get_word(end - 8) : 0;
+    const uint64_t next_body = layout.tail ? ascc_get_word(end - 16) : 0;
+    if (layout.tail && (bodies != (layout.tail - BODIES_FRAME) / BODY_WORDS ||
+                        next_body > (uint64_t)INT32_MAX + 1))
         return false;
 
-    *from = (snapshot){.dimension = (int32_t)dimension,
-                       .past = (int32_t)past,
-                       .fields = fields,
-                       .rows = {(size_t)fluid, (size_t)boundary},
+    *from = (snapshot){.dimension = layout.dimension,
+                       .past = layout.past,
+                       .fields = layout.fields,
+                       .rows = {layout.rows[ASCC_FLUID], layout.rows[ASCC_BOUNDARY]},
                        .next_id = ascc_get_word(bytes + 40),
                        .spacing = ascc_double_of(ascc_get_word(bytes + 48)),
                        .mass = ascc_double_of(ascc_get_word(bytes + 56)),
                        .quantum = ascc_double_of(ascc_get_word(bytes + 64)),
                        .body_count = (size_t)bodies,
                        .next_body = (int64_t)next_body,
-                       .bodies = end - 8 * (BODIES_FRAME + (size_t)bodies * BODY_WORDS)};
-    const unsigned char *at = bytes + 8 * SNAPSHOT_HEADER;
-    for (size_t i = 0; i < fields; i++) {
+                       .bodies = end - 8 * layout.tail};
+    const unsigned char *at = bytes + 8 * ASCC_SNAPSHOT_HEAD;
+    for (size_t i = 0; i < layout.fields; i++) {
         const ascc_particle_field *const field = &ascc_particle_fields[i];
         from->words[i] = at;
         at += 8 * from->rows[field->kind] *
