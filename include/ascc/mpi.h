@@ -84,6 +84,27 @@ ASCC_API ascc_status ascc_mpi_bodies_impulse(ascc_mpi_particles *set, size_t cou
                                              double (*torque)[3]);
 
 /**
+ * Writes the snapshot of the whole into the file `path` of process 0, which alone writes: the bytes are those of
+ * ascc_particles_snapshot of the whole, for any number of processes. It takes its place when it is complete and on disk; what
+ * was there is replaced in one instant, or stays as it was when any process fails.
+ *
+ * path      in UTF-8; read on process 0 alone
+ * errors    ARGUMENT, MEMORY, FILE (the message has the path and the reason), RANGE
+ * cost      all fluid goes to process 0, a few MiB at a time: it needs no memory for the whole
+ */
+ASCC_API ascc_status ascc_mpi_particles_save(ascc_mpi_particles *set, const char *path);
+
+/**
+ * The set becomes what a snapshot in the file `path` of process 0 says, whoever wrote it, on how many processes: each has
+ * its share of the fluid, and all have the walls and bodies. A run goes on from there bit for bit.
+ *
+ * path      in UTF-8; read on process 0 alone
+ * errors    ARGUMENT, MEMORY, FILE, FORMAT and MISMATCH as of ascc_particles_restore; the set is as it was
+ * cost      as of ascc_mpi_particles_save; each process for a while has its share three times
+ */
+ASCC_API ascc_status ascc_mpi_particles_load(ascc_mpi_particles *set, const char *path);
+
+/**
  * Makes an ordinary set on process `root` what the whole is: for snapshots, which are the same bytes for any number of
  * processes, sequences, measures. whole: a set of that dimension; read on root alone. errors: ARGUMENT, MEMORY, MISMATCH,
  * RANGE (an impulse of a wall beyond what can be held).

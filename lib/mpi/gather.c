@@ -143,14 +143,16 @@ static ascc_status fill(ascc_mpi_particles *set, const ascc_particles *whole, in
     return status;
 }
 
-/* The handle stays: what it has and what the other has change places. */
-static void change_places(ascc_particles *p, ascc_particles *fresh)
+void ascc_mpi_become(ascc_mpi_particles *set, ascc_particles *fresh)
 {
+    ascc_particles *p = set->local;
     const ascc_particles old = *p;
     *p = *fresh;
     *fresh = old;
     fresh->message = p->message;
     p->message = old.message;
+    set->curve.edge = ASCC_MPI_EDGE * p->spacing;
+    set->cut = false;
 }
 
 ascc_status ascc_mpi_particles_scatter(ascc_mpi_particles *set, const ascc_particles *whole,
@@ -178,11 +180,8 @@ ascc_status ascc_mpi_particles_scatter(ascc_mpi_particles *set, const ascc_parti
         status = fill(set, whole, root, fresh);
     status =
         ascc_mpi_conclude(set, set->by_other ? ASCC_OK : status, "no memory for a copy of the set");
-    if (status == ASCC_OK) {
-        change_places(set->local, fresh);
-        set->curve.edge = ASCC_MPI_EDGE * set->local->spacing;
-        set->cut = false;
-    }
+    if (status == ASCC_OK)
+        ascc_mpi_become(set, fresh);
     ascc_particles_destroy(&fresh);
     return status;
 }

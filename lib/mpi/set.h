@@ -81,6 +81,11 @@ static inline bool ascc_mpi_is_set(const ascc_mpi_particles *set)
 /* What walls have received from all fluid, on every process, in set->sums. errors: MEMORY, RANGE. */
 ascc_status ascc_mpi_sum_wall_impulses(ascc_mpi_particles *set);
 
+/* ---- gather.c ---- */
+
+/* The handle stays: what it has and what `fresh` has, of this process, change places. */
+void ascc_mpi_become(ascc_mpi_particles *set, ascc_particles *fresh);
+
 /* ---- exchange.c ---- */
 
 /* MPI_Allreduce of numbers in place, counted. */
