@@ -46,9 +46,18 @@ void ascc_printable(char *text)
     }
 }
 
+static bool muted;
+
+void ascc_console_mute(void)
+{
+    muted = true;
+}
+
 void ascc_line(FILE *to, const char *format, ...)
 {
     char text[16384]; /* longer lines are cut: a few paths fit */
+    if (muted)
+        return;
     va_list arguments;
     va_start(arguments, format);
     if (vsnprintf(text, sizeof text, format, arguments) < 0)

@@ -11,6 +11,9 @@
  * files. The newline is added. Texts of the program's own may be printed as they are. */
 void ascc_line(FILE *to, const char *format, ...) ASCC_FORMAT(2, 3);
 
+/* From now on lines are dropped: another process prints the same. */
+void ascc_console_mute(void);
+
 /* What a terminal would obey and not show, and what is no UTF-8, becomes '?'. */
 void ascc_printable(char *text);
 

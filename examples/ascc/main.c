@@ -1,6 +1,7 @@
 /* The ascc program: picks the subcommand. SPDX-License-Identifier: MIT */
 #include <stdbool.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include <ascc/ascc.h>
@@ -67,9 +68,33 @@ static int unknown(const char *name)
     return 2;
 }
 
+/* Whether an mpirun of Open MPI or MPICH started more of us, who would write over one another's files. */
+static bool is_one_of_many(void)
+{
+    static const char *const counts[] = {"OMPI_COMM_WORLD_SIZE", "PMI_SIZE"};
+    for (size_t i = 0; i < sizeof counts / sizeof *counts; i++) {
+        const char *count = getenv(counts[i]);
+        if (count && atoi(count) > 1)
+            return true;
+    }
+    return false;
+}
+
+static int sim_of_many(char **argv)
+{
+    ascc_system_become(argv[0], "ascc-mpi", argv);
+    ascc_line(
+        stderr,
+        "ascc sim: started by mpirun, but ascc-mpi, which runs on several processes, is not there: "
+        "it is built where an MPI is");
+    return 1;
+}
+
 static int run(int argc, char **argv)
 {
     const char *name = argc > 1 ? argv[1] : "";
+    if (strcmp(name, "sim") == 0 && is_one_of_many())
+        return sim_of_many(argv);
     const bool help = strcmp(name, "help") == 0 || is_help(name);
     static char help_word[] = "--help";
     char *help_words[] = {help_word, NULL};

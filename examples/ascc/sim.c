@@ -13,6 +13,7 @@
 #include "host.h"
 #include "new_file.h"
 #include "picture.h"
+#include "processes.h"
 #include "progress.h"
 #include "scenes.h"
 #include "system.h"
@@ -204,9 +205,10 @@ typedef struct simulation {
     ascc_model *rung[ASCC_MAX_RUNGS];
     char rung_name[ASCC_MAX_RUNGS][64];
     size_t rung_count;
-    ascc_particles *particles;
-    ascc_step *step;     /* or: */
-    ascc_ladder *ladder; /* which was told */
+    ascc_particles *particles; /* the lead's: all of it */
+    ascc_spread *spread;       /* it among processes */
+    ascc_step *step;           /* or: */
+    ascc_ladder *ladder;       /* which was told */
     ascc_sequence_writer *writer;
     ascc_frames exported;
     float *position, *velocity;
@@ -221,6 +223,7 @@ typedef struct simulation {
     uint64_t asleep;  /* in the last step */
     ascc_measures first, last;
     double max_density;
+    bool stopped; /* interrupted on some process */
     char error[768];
 } simulation;
 
@@ -284,7 +287,7 @@ static void add_stage(simulation *s, const ascc_stage_time *stage)
 static ascc_status run_step(simulation *s, const ascc_forces *forces)
 {
     return s->ladder ? ascc_ladder_run(s->ladder, s->particles, forces, 1)
-                     : ascc_step_run(s->step, s->particles, forces, 1);
+                     : ascc_spread_run(s->spread, s->step, forces);
 }
 
 static void count_step(simulation *s)
@@ -293,7 +296,8 @@ static void count_step(simulation *s)
     ascc_ladder_statistics l = {.size = sizeof l};
     if (s->ladder)
         (void)ascc_ladder_get_statistics(s->ladder, &l);
-    (void)ascc_step_get_statistics(s->ladder ? ascc_ladder_step(s->ladder, l.rung) : s->step, &t);
+    (void)ascc_spread_statistics(s->spread,
+                                 s->ladder ? ascc_ladder_step(s->ladder, l.rung) : s->step, &t);
     for (int32_t i = 0; i < t.stage_count; i++)
         add_stage(s, &t.stage[i]);
     s->seconds_total += t.seconds_total;
@@ -303,28 +307,63 @@ static void count_step(simulation *s)
                        t.support_impulse[c] - t.momentum_after[c];
 }
 
+/* Something that the lead does with the whole fluid as it is now; all know whether it did. */
+static bool let_lead(simulation *s, bool (*act)(simulation *s))
+{
+    if (ascc_spread_gather(s->spread) != ASCC_OK) {
+        (void)snprintf(s->error, sizeof s->error, "%s", ascc_spread_message(s->spread, s->step));
+        return false;
+    }
+    return ascc_processes_agree(!ascc_processes_lead() || act(s), s->error, sizeof s->error);
+}
+
+static bool measure_first(simulation *s)
+{
+    return measure(s, &s->first);
+}
+
+static bool measure_last(simulation *s)
+{
+    return measure(s, &s->last);
+}
+
+static bool write_and_measure(simulation *s)
+{
+    return write_frame(s) && measure_last(s);
+}
+
+static bool is_interrupted(void)
+{
+    return !ascc_processes_agree(!interrupted, NULL, 0);
+}
+
 static bool advance(simulation *s)
 {
     const ascc_forces forces = {.size = sizeof forces,
                                 .gravity = s->o->gravity_count ? s->o->gravity : s->scene.gravity};
     ascc_progress progress;
     ascc_progress_start(&progress, "stepping", (size_t)s->o->steps);
-    bool good = write_frame(s);
-    while (good && s->steps < s->o->steps && !interrupted) {
+    bool good = let_lead(s, write_frame);
+    progress.visible = progress.visible && ascc_processes_lead();
+    while (good && s->steps < s->o->steps) {
+        s->stopped = is_interrupted();
+        if (s->stopped)
+            break;
         if (run_step(s, &forces) != ASCC_OK) {
             (void)snprintf(s->error, sizeof s->error, "step %d: %s", s->steps + 1,
-                           s->ladder ? ascc_ladder_message(s->ladder) : ascc_step_message(s->step));
+                           s->ladder ? ascc_ladder_message(s->ladder)
+                                     : ascc_spread_message(s->spread, s->step));
             good = false;
             break;
         }
         s->steps++;
         count_step(s);
         if (s->steps % s->o->every == 0)
-            good = write_frame(s) && measure(s, &s->last);
+            good = let_lead(s, write_and_measure);
         ascc_progress_add(&progress, 1);
     }
     ascc_progress_end(&progress);
-    return measure(s, &s->last) && good;
+    return let_lead(s, measure_last) && good;
 }
 
 /* ---- The table at the end ---- */
@@ -394,8 +433,11 @@ static void print_table(const simulation *s)
     const double n = s->steps ? s->steps : 1;
     ascc_line(stdout, "particles           %zu fluid, %zu boundary", s->scene.count,
               s->scene.walls);
-    ascc_line(stdout, "steps               %d of %g s, %d threads", s->steps, s->time_step,
-              s->o->threads);
+    char processes[32] = "";
+    if (ascc_processes_count() > 1)
+        (void)snprintf(processes, sizeof processes, "%d processes of ", ascc_processes_count());
+    ascc_line(stdout, "steps               %d of %g s, %s%d threads", s->steps, s->time_step,
+              processes, s->o->threads);
     for (int32_t i = 0; i < s->stage_count; i++)
         ascc_line(stdout, "  %-17s %9.3f ms a step", s->stage[i], 1e3 * s->seconds[i] / n);
     ascc_line(stdout, "  %-17s %9.3f ms a step", "total", 1e3 * s->seconds_total / n);
@@ -439,35 +481,65 @@ static ascc_status open_rungs(simulation *s, ascc_host_error *why)
     return status;
 }
 
-/* The scene and the model. A model file says what spacing a built-in scene gets; the demonstration
- * model is made for the scene's. */
-static bool open_model(simulation *s)
+static bool failed(simulation *s, const char *what, ascc_status status, const char *message)
+{
+    (void)snprintf(s->error, sizeof s->error, "%s: %s%s%s", what, ascc_status_text(status),
+                   message[0] ? ": " : "", message);
+    return false;
+}
+
+/* The lead's scene; others know all of it but its particles. */
+static bool open_scene(simulation *s, double spacing)
 {
     const options *o = s->o;
-    const bool demo = strcmp(o->model, "demo") == 0;
-    const ascc_context_options context = {.size = sizeof context, .thread_count = o->threads};
-    ascc_model_info info = {.size = sizeof info, .particle_spacing = 0.05};
-    ascc_host_error why = {""};
-    ascc_status status = ascc_context_create(&context, &s->context);
-    if (status == ASCC_OK && o->rungs)
-        status = open_rungs(s, &why);
-    else if (status == ASCC_OK && !demo)
-        status = ascc_host_load(s->context, o->model, &s->model, &why);
-    if (status == ASCC_OK && !demo)
-        status = ascc_model_get_info(s->model, &info);
-    const double spacing = o->spacing > 0.0 ? o->spacing : info.particle_spacing;
-    if (status == ASCC_OK &&
-        !ascc_scene_load(o->scene, o->size, spacing, &s->scene, s->error, sizeof s->error))
+    const bool lead = ascc_processes_lead();
+    const bool good =
+        !lead || ascc_scene_load(o->scene, o->size, spacing, &s->scene, s->error, sizeof s->error);
+    if (!ascc_processes_agree(good, s->error, sizeof s->error))
         return false;
-    if (status == ASCC_OK && demo)
+    ascc_sequence shared = s->scene;
+    ascc_processes_share(&shared, sizeof shared);
+    if (!lead) {
+        shared.position = shared.velocity = shared.wall = shared.normal = NULL;
+        s->scene = shared;
+    }
+    return true;
+}
+
+/* Models from files; the demonstration model is made for a scene. */
+static bool open_model(simulation *s, ascc_model_info *info)
+{
+    const options *o = s->o;
+    const bool demo = strcmp(o->model, "demo") == 0 && !o->rungs;
+    ascc_host_error why = {""};
+    ascc_status status;
+    if (demo)
         status = ascc_host_model(s->context, o->model, s->scene.dimension, 2.0 * s->scene.radius,
                                  &s->model, &why);
-    if (status == ASCC_OK && demo)
-        status = ascc_model_get_info(s->model, &info);
-    if (status != ASCC_OK) {
-        ascc_host_complain(o->model, status, why.text);
+    else if (o->rungs)
+        status = open_rungs(s, &why);
+    else
+        status = ascc_host_load(s->context, o->model, &s->model, &why);
+    if (status == ASCC_OK)
+        status = ascc_model_get_info(s->model, info);
+    const bool good = status == ASCC_OK || failed(s, o->model, status, why.text);
+    return ascc_processes_agree(good, s->error, sizeof s->error);
+}
+
+/* The scene and the model. A model file says what spacing a built-in scene gets. */
+static bool open_both(simulation *s)
+{
+    const options *o = s->o;
+    const bool demo = strcmp(o->model, "demo") == 0 && !o->rungs;
+    const ascc_context_options context = {.size = sizeof context, .thread_count = o->threads};
+    ascc_model_info info = {.size = sizeof info, .particle_spacing = 0.05};
+    const ascc_status status = ascc_context_create(&context, &s->context);
+    const bool good = status == ASCC_OK || failed(s, "context", status, "");
+    if (!ascc_processes_agree(good, s->error, sizeof s->error) || (!demo && !open_model(s, &info)))
         return false;
-    }
+    const double spacing = o->spacing > 0.0 ? o->spacing : info.particle_spacing;
+    if (!open_scene(s, spacing) || (demo && !open_model(s, &info)))
+        return false;
     if (info.dimension != s->scene.dimension)
         (void)snprintf(s->error, sizeof s->error, "%s is a model in %dD, %s a scene in %dD",
                        o->model, info.dimension, o->scene, s->scene.dimension);
@@ -476,17 +548,23 @@ static bool open_model(simulation *s)
                        o->gravity_count, o->scene, s->scene.dimension);
     else if (s->scene.count == 0)
         (void)snprintf(s->error, sizeof s->error, "%s: there is no fluid", o->scene);
+    else if (o->rungs && ascc_processes_count() > 1)
+        (void)snprintf(s->error, sizeof s->error, "a --ladder runs on one process");
     s->time_step = o->time_step > 0.0 ? o->time_step : info.time_step;
     return !s->error[0];
 }
 
-static bool open_step(simulation *s)
+/* The lead's particles. */
+static bool open_particles(simulation *s)
 {
     const float *position;
-    if (!start_of(s->o, &s->scene, &position, s->error, sizeof s->error) ||
-        ascc_host_particles(s->context, &s->scene, position, s->scene.velocity, &s->particles) !=
-            ASCC_OK)
-        return false;
+    return start_of(s->o, &s->scene, &position, s->error, sizeof s->error) &&
+           ascc_host_particles(s->context, &s->scene, position, s->scene.velocity, &s->particles) ==
+               ASCC_OK;
+}
+
+static bool open_step(simulation *s)
+{
     const ascc_step_options settings = {
         .size = sizeof settings, .time_step = s->o->time_step, .sleep_speed = s->o->sleep_speed};
     const ascc_ladder_options ladder = {
@@ -495,12 +573,24 @@ static bool open_step(simulation *s)
         s->o->rungs ? ascc_ladder_create(s->context, s->rung_count,
                                          (const ascc_model *const *)s->rung, &ladder, &s->ladder)
                     : ascc_step_create(s->context, s->model, &settings, &s->step);
-    if (status == ASCC_OK)
-        return true;
-    char message[256];
-    (void)ascc_context_message(s->context, message, sizeof message);
-    ascc_host_complain(s->o->rungs ? "ladder" : "step", status, message);
-    return false;
+    char message[256] = "";
+    if (status != ASCC_OK)
+        (void)ascc_context_message(s->context, message, sizeof message);
+    const bool good =
+        status == ASCC_OK || failed(s, s->o->rungs ? "ladder" : "step", status, message);
+    return ascc_processes_agree(good, s->error, sizeof s->error);
+}
+
+static bool open_fluid(simulation *s)
+{
+    const bool good = !ascc_processes_lead() || open_particles(s);
+    const ascc_particles_options fluid = {.size = sizeof fluid,
+                                          .dimension = s->scene.dimension,
+                                          .spacing = 2.0 * s->scene.radius,
+                                          .mass = s->scene.mass};
+    return ascc_processes_agree(good, s->error, sizeof s->error) && open_step(s) &&
+           ascc_spread_open(s->context, &fluid, s->particles, &s->spread, s->error,
+                            sizeof s->error) == ASCC_OK;
 }
 
 static bool open_outputs(simulation *s)
@@ -536,6 +626,7 @@ static bool open_outputs(simulation *s)
 
 static void close_all(simulation *s)
 {
+    ascc_spread_close(&s->spread);
     ascc_step_destroy(&s->step);
     ascc_ladder_destroy(&s->ladder);
     ascc_particles_destroy(&s->particles);
@@ -550,6 +641,28 @@ static void close_all(simulation *s)
     free(s->id);
 }
 
+/* What the lead has to say and to complete. What was computed before a step failed is kept. */
+static bool report(simulation *s, bool good)
+{
+    char finish[512] = "";
+    if (s->steps)
+        print_table(s);
+    if (s->writer &&
+        !ascc_sequence_finish(s->writer, s->steps > 0 || good, finish, sizeof finish)) {
+        ascc_line(stderr, "ascc sim: %s", finish);
+        good = false;
+    }
+    if (s->error[0])
+        ascc_line(stderr, "ascc sim: %s", s->error);
+    if (!ascc_frames_close(&s->exported, finish, sizeof finish)) {
+        ascc_line(stderr, "ascc sim: %s", finish);
+        good = false;
+    }
+    if (s->stopped)
+        ascc_line(stderr, "ascc sim: interrupted after %d steps", s->steps);
+    return good;
+}
+
 int ascc_command_sim(int argc, char **argv)
 {
     if (argc == 1 && strcmp(argv[0], "--help") == 0) {
@@ -560,30 +673,19 @@ int ascc_command_sim(int argc, char **argv)
     if (!read_arguments(&o, argc, argv))
         return 2;
     simulation s = {.o = &o};
-    bool good = open_model(&s) && open_step(&s) && open_outputs(&s) && measure(&s, &s.first);
+    bool good = open_both(&s) && open_fluid(&s) && let_lead(&s, open_outputs) &&
+                let_lead(&s, measure_first);
     if (good) {
         (void)signal(SIGINT, on_interrupt);
         (void)signal(SIGTERM, on_interrupt);
         good = advance(&s);
         (void)signal(SIGINT, SIG_DFL);
         (void)signal(SIGTERM, SIG_DFL);
-        if (s.steps)
-            print_table(&s);
     }
-    char finish[512] = "";
-    /* What was computed before a step failed is kept. */
-    if (s.writer && !ascc_sequence_finish(s.writer, s.steps > 0 || good, finish, sizeof finish)) {
-        ascc_line(stderr, "ascc sim: %s", finish);
-        good = false;
-    }
-    if (s.error[0])
-        ascc_line(stderr, "ascc sim: %s", s.error);
-    if (!ascc_frames_close(&s.exported, finish, sizeof finish)) {
-        ascc_line(stderr, "ascc sim: %s", finish);
-        good = false;
-    }
-    if (interrupted)
-        ascc_line(stderr, "ascc sim: interrupted after %d steps", s.steps);
+    if (ascc_processes_lead())
+        good = report(&s, good);
+    good = ascc_processes_agree(good, NULL, 0);
+    const bool stopped = s.stopped;
     close_all(&s);
-    return !good ? 1 : interrupted ? 130 : 0;
+    return !good ? 1 : stopped ? 130 : 0;
 }

@@ -69,6 +69,9 @@ bool ascc_system_replace(const char *from, const char *to, const char *folder);
 void ascc_system_remove(const char *path);
 
 bool ascc_system_is_terminal(FILE *stream);
+/* Another program goes on in place of this one: `name` beside `self`, as this one was called, or on the PATH. Returns
+ * where there is none. */
+void ascc_system_become(const char *self, const char *name, char **words);
 /* Runs a program whose input is written by a function; false where it is not there or fails. */
 bool ascc_system_feed(const char *program, void (*write)(FILE *to, const void *data),
                       const void *data);

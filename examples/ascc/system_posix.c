@@ -245,6 +245,14 @@ bool ascc_system_is_terminal(FILE *stream)
     return isatty(fileno(stream)) != 0;
 }
 
+void ascc_system_become(const char *self, const char *name, char **words)
+{
+    char path[4096];
+    const int folder = (int)(ascc_system_name(self) - self);
+    if (snprintf(path, sizeof path, "%.*s%s", folder, self, name) < (int)sizeof path)
+        (void)execvp(path, words);
+}
+
 bool ascc_system_feed(const char *program, void (*write)(FILE *to, const void *data),
                       const void *data)
 {

@@ -267,6 +267,13 @@ bool ascc_system_is_terminal(FILE *stream)
     return _isatty(_fileno(stream)) != 0;
 }
 
+void ascc_system_become(const char *self, const char *name, char **words)
+{
+    (void)self;
+    (void)name;
+    (void)words;
+}
+
 bool ascc_system_feed(const char *program, void (*write)(FILE *to, const void *data),
                       const void *data)
 {
