@@ -17,11 +17,17 @@
 #include "hyperviscosity.h"
 #include "relaxation_pairs.h"
 
-#define ROWS 256 /* of a block of work */
+#define ROWS 256       /* of a block of work */
+#define SET_ASIDE 4096 /* pairs, so that workers seldom meet at the counter */
 /* How far the network may take a particle from where it saw it, units: differences fit 32 bits. */
 #define FARTHEST (((int64_t)1 << 30) - ((int64_t)1 << 27))
 /* Compressions are summed in integers. */
 #define COMPRESSION_UNIT 0x1p-24
+
+/* Pairs that a worker has set aside and not used. */
+typedef struct pair_room {
+    size_t next, end;
+} pair_room;
 
 /* Rows are those of ASCC_SET_FLUID. Vectors are three arrays. */
 typedef struct relaxation {
@@ -37,9 +43,12 @@ typedef struct relaxation {
     int32_t *wall_low[3];
     float *wall_move[3], *inflow;
     ascc_pair_sum sum;
-    /* What the pairs are: */
-    size_t *start, *end; /* [count + 1], [count] */
+    /* What the pairs are; those of a row lie together, rows in any order: */
+    size_t *start, *end; /* [count] */
     uint32_t *neighbor;
+    size_t capacity;    /* pairs there is room for */
+    atomic_size_t used; /* set aside; more than the capacity: rows are missing */
+    pair_room *aside;   /* [slots] */
     float *g[3], *weight;
     float *own[3];                                       /* sum of g, walls included */
     float *push[3];                                      /* the same by weight */
@@ -102,16 +111,37 @@ static bool is_idle(const relaxation *r, size_t i)
     return ascc_hierarchy_is_idle(&r->state->hierarchy, i);
 }
 
-/* Where the pairs of each row may begin, with room for all that its list has; rows of a block then follow one
- * another without gaps. */
-static size_t place_rows(relaxation *r)
+static bool take_pairs(relaxation *r, size_t capacity)
 {
-    size_t at = 0;
+    r->capacity = capacity;
+    r->neighbor = room_for(r, capacity, sizeof *r->neighbor);
+    if (!r->sum.uniform)
+        r->weight = room_for(r, capacity, sizeof *r->weight);
+    return r->neighbor && (r->sum.uniform || r->weight) && vector_room(r, r->g, capacity);
+}
+
+/* How many of the entries of lists are within the support where they lie evenly, in whole vectors. */
+static double even_pairs(const relaxation *r, size_t entries)
+{
+    const double ratio = 1.0 / ((double)r->inverse_support * r->rows->radius);
+    const double share =
+        r->state->particles->dimension == 2 ? ratio * ratio : ratio * ratio * ratio;
+    return (share < 1.0 ? share : 1.0) * (double)entries + 4.0 * (double)r->count;
+}
+
+/* Room for as many pairs as the last relaxation kept and some more; the first time for as many as there should be;
+ * where a way back reads them, for all that the lists have. */
+static bool make_room_for_pairs(relaxation *r)
+{
+    const size_t aside = (size_t)ascc_workers_count(r->state->tools.workers) * SET_ASIDE;
+    size_t entries = 0, most = 0, expected = *r->state->expected_pairs;
     for (size_t i = 0; i < r->count; i++) {
-        r->start[i] = at;
-        at += is_idle(r, i) ? 0 : whole_vectors(r->rows->count[i]);
+        entries += is_idle(r, i) ? 0 : r->rows->count[i];
+        most += is_idle(r, i) ? 0 : whole_vectors(r->rows->count[i]);
     }
-    return at;
+    if (!expected)
+        expected = (size_t)even_pairs(r, entries);
+    return take_pairs(r, aside + (r->trace ? most : ascc_min_size(most, expected + expected / 16)));
 }
 
 static bool lend_memory(relaxation *r)
@@ -131,9 +161,8 @@ static bool lend_memory(relaxation *r)
     if (!room || !r->start || !r->end || !r->low || !r->move || !r->near ||
         !vector_room(r, r->own, n))
         return false;
-    const size_t pairs = place_rows(r);
     r->room = whole_vectors(ascc_max_size(r->rows->longest, r->wall_rows->longest));
-    r->neighbor = room_for(r, pairs, sizeof *r->neighbor);
+    r->aside = ascc_arena_lend(arena, slots, sizeof *r->aside);
     r->scratch = ascc_arena_lend(arena, slots * r->room, 4 * sizeof *r->scratch);
     memcpy(r->push, r->own, sizeof r->push);
     if (r->slows && r->constants->viscosity.count) {
@@ -141,12 +170,9 @@ static bool lend_memory(relaxation *r)
         if (!r->smoothing)
             return false;
     }
-    if (!r->sum.uniform) {
-        r->weight = room_for(r, pairs, sizeof *r->weight);
-        if (!r->weight || !vector_room(r, r->push, n))
-            return false;
-    }
-    return r->neighbor && r->scratch && vector_room(r, r->g, pairs);
+    if (!r->sum.uniform && !vector_room(r, r->push, n))
+        return false;
+    return r->aside && r->scratch && make_room_for_pairs(r);
 }
 
 /* ---- Geometry ---- */
@@ -206,6 +232,19 @@ static void find_directions(const relaxation *r, size_t i, bool walls, const uin
                           ASCC_MAPPING_DIRECTION, pairs);
     else
         kernels->directions(r->low, neighbor, count, at, r->inverse_support, pairs);
+}
+
+/* Sets room aside for all that a row's list has; false if there is none. What is not used is given back. */
+static bool begin_row(relaxation *r, size_t i, pair_room *aside)
+{
+    const size_t most = whole_vectors(r->rows->count[i]);
+    if (most > aside->end - aside->next) {
+        const size_t wanted = ascc_max_size(most, SET_ASIDE);
+        aside->next = atomic_fetch_add_explicit(&r->used, wanted, memory_order_relaxed);
+        aside->end = aside->next + wanted;
+    }
+    r->start[i] = r->end[i] = aside->next;
+    return aside->next + most <= r->capacity;
 }
 
 /* Keeps the gradients of a row's fluid pairs; sums as the kernel gives them. */
@@ -291,7 +330,7 @@ static void find_divergence(relaxation *r, size_t begin, size_t end)
 /* A row without pairs, which stays as it is. */
 static void leave_out(relaxation *r, size_t i)
 {
-    r->end[i] = r->start[i];
+    r->start[i] = r->end[i] = 0;
     r->near[i] = 0;
     if (r->smoothing)
         r->smoothing[i] = 0.0f;
@@ -312,16 +351,20 @@ static void look_around(void *data, size_t begin, size_t end, int32_t slot)
 {
     relaxation *r = data;
     float *scratch = r->scratch + (size_t)slot * 4 * r->room;
+    pair_room *aside = &r->aside[slot];
     const float least = (float)(r->constants->epsilon * r->constants->lattice_response);
     for (size_t i = begin; i < end; i++) {
         float sum[8], wall[8] = {0};
-        if (i > begin)
-            r->start[i] = r->end[i - 1];
         if (is_idle(r, i)) {
             leave_out(r, i);
             continue;
         }
+        if (!begin_row(r, i, aside)) {
+            aside->next = aside->end; /* it counts as used, and the row is looked at again */
+            continue;
+        }
         look(r, i, scratch, sum);
+        aside->next = r->end[i];
         if (r->wall_rows->count[i])
             look_at_walls(r, i, scratch, wall);
         float square = sum[4];
@@ -336,8 +379,25 @@ static void look_around(void *data, size_t begin, size_t end, int32_t slot)
             r->smoothing[i] = smoothing_of(r, i, sum[4]);
         r->response[i] = 1.0f / (square + least);
     }
-    if (r->slows)
+    if (r->slows && atomic_load_explicit(&r->used, memory_order_relaxed) <= r->capacity)
         find_divergence(r, begin, end);
+}
+
+/* Finds the pairs; again with more room, if there is not enough. False without memory. */
+static bool find_pairs(relaxation *r)
+{
+    ascc_workers *workers = r->state->tools.workers;
+    for (;;) {
+        memset(r->aside, 0, (size_t)ascc_workers_count(workers) * sizeof *r->aside);
+        atomic_store(&r->used, 0);
+        ascc_workers_run(workers, r->count, ROWS, look_around, r);
+        const size_t used = atomic_load(&r->used);
+        *r->state->expected_pairs = used;
+        if (used <= r->capacity)
+            return true;
+        if (!take_pairs(r, used + used / 8))
+            return false;
+    }
 }
 
 /* Volumes of the walls that the step sees. */
@@ -493,9 +553,9 @@ static ascc_status open_relaxation(relaxation *r, ascc_step_state *state, bool s
                          state->particles->id[row], row);
     }
     status = slows ? refresh_move(r) : ASCC_OK;
-    if (status == ASCC_OK)
-        ascc_workers_run(tools->workers, r->count, ROWS, look_around, r);
-    return status == ASCC_OK && r->trace && !begin_trace(r) ? no_memory(state) : status;
+    if (status != ASCC_OK)
+        return status;
+    return !find_pairs(r) || (r->trace && !begin_trace(r)) ? no_memory(state) : ASCC_OK;
 }
 
 /* ---- Sweeps ---- */

@@ -92,6 +92,7 @@ typedef struct ascc_step_state {
     ascc_turn turn;                /* of all that stages see, from the host's axes */
     double length_unit, time_unit; /* m and s of the model in the host's unit and second */
     size_t *expected;              /* of the network's neighbour lists */
+    size_t *expected_pairs;        /* that the last relaxation kept */
     ascc_status (*engine)(struct ascc_step_state *state); /* engine.h */
     ascc_wall_volumes *walls;                             /* kept while they rest */
     ascc_search_tools tools;

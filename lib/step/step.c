@@ -277,6 +277,7 @@ ascc_status ascc_step_once(ascc_step *step, ascc_particles *p, const ascc_motion
         .length_unit = step->model_length,
         .time_unit = step->model_time,
         .expected = step->expected,
+        .expected_pairs = &step->expected_pairs,
         .engine = step->engine,
         .walls = &step->walls,
         .tools = {arena, step->context->workers, &step->context->kernels, &step->message},

@@ -16,7 +16,8 @@ struct ascc_step {
     double sleep_speed;
     double model_length, model_time; /* the model's m and s in the host's unit and second */
     ascc_network network;
-    size_t *expected; /* [key_count of the network] neighbours of the last step */
+    size_t *expected;      /* [key_count of the network] neighbours of the last step */
+    size_t expected_pairs; /* that its relaxation kept */
     ascc_engine engine;
     ascc_arena arena;
     ascc_wall_volumes walls;
