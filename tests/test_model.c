@@ -930,6 +930,100 @@ static void wrong_bases_and_transfers_are_refused_by_name(void **state)
     }
 }
 
+/* Moments, sums on a lattice, and stencils over them. */
+static const char trunk[] =
+    "{\"name\":\"n\",\"dimension\":2,\"time_step\":0.01,\"gravity\":[0,-9.81],"
+    "\"particle_spacing\":0.05,\"rest_density\":1000,\"evaluate\":\"advected\","
+    "\"features\":{\"fluid\":[\"one\",\"motion\"],\"boundary\":[\"area\",\"normal\"]},"
+    "\"levels\":[{\"voxel\":0.1},{\"voxel\":0.2}],\"sampling\":{\"method\":\"voxel_corners\","
+    "\"anchor\":\"world\",\"hysteresis\":0,\"points\":\"fluid\"},\"layers\":["
+    "{\"name\":\"sums\",\"points\":\"fluid\",\"channels\":12,\"terms\":[{\"type\":\"moments\","
+    "\"source\":\"fluid\",\"radius\":0.1,\"basis\":{\"bumps\":1},"
+    "\"walls\":{\"radius\":0.1,\"basis\":{\"bumps\":1}}}]},"
+    "{\"name\":\"s0\",\"points\":\"level1\",\"channels\":6,\"terms\":[{\"type\":\"transfer\","
+    "\"source\":\"fluid\"},{\"type\":\"transfer\",\"source\":\"boundary\",\"column\":3}]},"
+    "{\"name\":\"l0\",\"points\":\"level1\",\"channels\":2,\"terms\":[{\"type\":\"stencil\","
+    "\"source\":\"s0\",\"relative\":true,\"kernel\":\"k0\"}]},"
+    "{\"name\":\"w0\",\"points\":\"level1\",\"channels\":2,\"terms\":[{\"type\":\"stencil\","
+    "\"source\":\"l0\",\"relu\":true,\"kernel\":\"k1\",\"bias\":\"b1\"}]},"
+    "{\"name\":\"h\",\"points\":\"fluid\",\"channels\":2,\"terms\":[{\"type\":\"dense\","
+    "\"source\":\"sums\",\"weight\":\"hd\"},{\"type\":\"transfer\",\"source\":\"w0\"}]}],"
+    "\"output\":{\"type\":\"antisymmetric\",\"source\":\"h\",\"relu\":true,\"kernel\":\"o\","
+    "\"radius\":0.1,\"basis\":{\"bumps\":4},\"scale\":0.01}}";
+
+static unsigned char *trunk_bytes(const char *network, size_t *size)
+{
+    model_builder builder;
+    model_builder_open(&builder);
+    model_builder_metadata(&builder, "format", "ascc.model");
+    model_builder_metadata(&builder, "version", "1");
+    model_builder_metadata(&builder, "network", network);
+    add_tensor(&builder, "k0", 3, (const size_t[]){9, 8, 2}, 0);
+    add_tensor(&builder, "k1", 3, (const size_t[]){9, 2, 2}, 0);
+    add_tensor(&builder, "b1", 1, (const size_t[]){2}, 0);
+    add_tensor(&builder, "hd", 2, (const size_t[]){12, 2}, 0);
+    add_tensor(&builder, "o", 2, (const size_t[]){4, 2}, 0);
+    return model_builder_finish(&builder, size);
+}
+
+static void wrong_moments_and_stencils_are_refused_by_name(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *from, *to, *hint;
+    } cases[] = {
+        /* Bumps that do not agree with what reads them. */
+        {"\"radius\":0.1,\"basis\":{\"bumps\":1},\"walls\"",
+         "\"radius\":0.1,\"basis\":{\"bumps\":2},\"walls\"", "layer 'sums'"},
+        {"\"walls\":{\"radius\":0.1,\"basis\":{\"bumps\":1}}",
+         "\"walls\":{\"radius\":0.1,\"basis\":{\"bumps\":3}}", "layer 'sums'"},
+        {"\"walls\":{\"radius\":0.1,\"basis\":{\"bumps\":1}}",
+         "\"walls\":{\"radius\":0.1,\"basis\":{\"bumps\":9}}", "'bumps'"},
+        {"\"basis\":{\"bumps\":4}", "\"basis\":{\"bumps\":5}", "[4, 2], but must have [5, 2]"},
+        {"\"channels\":12", "\"channels\":18", "[12, 2], but must have [18, 2]"},
+        /* What moments are of. */
+        {"\"one\",\"motion\"", "\"one\",\"velocity\"", "with the feature 'motion'"},
+        {"\"area\",\"normal\"", "\"area\",\"one\"", "the boundary's feature 'normal'"},
+        {"\"type\":\"moments\",\"source\":\"fluid\"",
+         "\"type\":\"moments\",\"source\":\"boundary\"", "'moments' are of 'fluid'"},
+        /* Stencils across levels, and on what is no lattice. */
+        {"{\"name\":\"w0\",\"points\":\"level1\"", "{\"name\":\"w0\",\"points\":\"level2\"",
+         "layer 'w0': a stencil reads the level that it lies on"},
+        {"{\"name\":\"w0\",\"points\":\"level1\"", "{\"name\":\"w0\",\"points\":\"fluid\"",
+         "layer 'w0': a stencil reads the level that it lies on"},
+        {"\"hysteresis\":0,", "\"hysteresis\":0.1,", "without hysteresis"},
+        {"\"world\"", "\"centroid\"", "at the world's origin"},
+        {"\"voxel_corners\",\"anchor\":\"world\",\"hysteresis\":0",
+         "\"voxel_centers\",\"anchor\":\"world\"", "levels of 'voxel_corners'"},
+        {"\"source\":\"s0\",\"relative\":true", "\"source\":\"s0\",\"relu\":true,\"relative\":true",
+         "layer 'l0': a 'relative' stencil reads mass, momentum, walls and normals, 6 channels"},
+        {"\"kernel\":\"k1\"", "\"kernel\":\"k0\"",
+         "but must have [9, 2, 2]: taps, inputs, outputs"},
+        {"\"dimension\":2", "\"dimension\":3", "'gravity'"},
+        /* Lattices that are too fine, and levels that are not there. */
+        {"[{\"voxel\":0.1},", "[{\"voxel\":0.0249},",
+         "a lattice of 0.0249 m is finer than half a particle spacing"},
+        {"{\"voxel\":0.1},", "{},", "'voxel'"},
+        {"[{\"voxel\":0.1},{\"voxel\":0.2}]", "[]", "layer 's0': no such level"},
+        {"{\"name\":\"l0\",\"points\":\"level1\"", "{\"name\":\"l0\",\"points\":\"level3\"",
+         "layer \'l0\': no such level"},
+        {"\"name\":\"n\"", "\"name\":\"m\"", NULL},
+        {"[{\"voxel\":0.1},", "[{\"voxel\":0.025},", NULL}, /* half a spacing is not too fine */
+    };
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        size_t size;
+        char *network = replaced(trunk, cases[i].from, cases[i].to);
+        unsigned char *bytes = trunk_bytes(network, &size);
+        free(network);
+        if (cases[i].hint) {
+            must_refuse(cases[i].to, bytes, size, cases[i].hint);
+            continue;
+        }
+        ascc_model *model = must_load(bytes, size);
+        ascc_model_destroy(&model);
+    }
+}
+
 static void wrong_motions_dampings_and_walls_are_refused_by_name(void **state)
 {
     (void)state;
@@ -1351,6 +1445,7 @@ int main(void)
         cmocka_unit_test(wrong_descriptions_are_refused_by_name),
         cmocka_unit_test(wrong_graph_networks_are_refused_by_name),
         cmocka_unit_test(wrong_bases_and_transfers_are_refused_by_name),
+        cmocka_unit_test(wrong_moments_and_stencils_are_refused_by_name),
         cmocka_unit_test(wrong_motions_dampings_and_walls_are_refused_by_name),
         cmocka_unit_test(wrong_abstractions_and_interpolations_are_refused_by_name),
         cmocka_unit_test(layers_without_terms_are_refused),

@@ -221,20 +221,62 @@ static void strays_fall_where_coarse_points_depend_on_all_particles(void **state
     }
 }
 
+static unsigned char *shipped(const char *name, size_t *size)
+{
+    char path[1024];
+    snprintf(path, sizeof path, "%s/examples/models/%s.safetensors", SOURCE_ROOT, name);
+    FILE *f = fopen(path, "rb");
+    assert_non_null(f);
+    const size_t room = (size_t)1 << 22;
+    unsigned char *bytes = malloc(room);
+    *size = fread(bytes, 1, room, f);
+    assert_true(*size < room);
+    fclose(f);
+    return bytes;
+}
+
+/* A trunk whose levels have no corner, then those of one particle. */
+static void a_lattice_without_fluid_steps_and_one_of_a_particle_lets_it_fall(void **state)
+{
+    (void)state;
+    size_t size;
+    unsigned char *bytes = shipped("water3d", &size);
+    const double high[3] = {1.0, 5.0, 1.0};
+    const ascc_const_array at = {.data = high, .scalar = ASCC_DOUBLE};
+    const scene s = {.dimension = 3};
+    double velocity[3];
+    const ascc_array v = {.data = velocity, .scalar = ASCC_DOUBLE};
+    ascc_context *context;
+    ascc_model *model;
+    ascc_step *step;
+    assert_int_equal(ascc_context_create(NULL, &context), ASCC_OK);
+    assert_int_equal(ascc_model_load_memory(context, bytes, size, &model), ASCC_OK);
+    ascc_model_info info = {.size = sizeof info};
+    assert_int_equal(ascc_model_get_info(model, &info), ASCC_OK);
+    ascc_particles *p = make_particles(context, info.particle_spacing, &s);
+    assert_int_equal(ascc_step_create(context, model, NULL, &step), ASCC_OK);
+    assert_int_equal(ascc_step_run(step, p, NULL, 1), ASCC_OK);
+    assert_int_equal(ascc_particles_clear(p, ASCC_FLUID), ASCC_OK);
+    assert_int_equal(ascc_step_run(step, p, NULL, 2), ASCC_OK);
+    assert_int_equal(ascc_particles_add_fluid(p, 1, &at, NULL, NULL, NULL), ASCC_OK);
+    assert_int_equal(ascc_step_run(step, p, NULL, 2), ASCC_OK);
+    assert_int_equal(ascc_particles_get(p, ASCC_FLUID, ASCC_VELOCITY, 0, 1, &v), ASCC_OK);
+    assert_true(velocity[0] == 0.0 && velocity[2] == 0.0);
+    assert_true(fabs(velocity[1] + 2.0 * 9.81 * info.time_step) < 1e-9); /* quanta */
+    ascc_step_destroy(&step);
+    ascc_particles_destroy(&p);
+    ascc_model_destroy(&model);
+    ascc_context_destroy(&context);
+    free(bytes);
+}
+
 static void strays_fall_and_leave_the_others_with_the_projects_networks(void **state)
 {
     (void)state;
     static const char *const names[] = {"water2d", "water2d-tiny", "water3d", "water3d-tiny"};
     for (int i = 0; i < 4; i++) {
-        char path[1024];
-        snprintf(path, sizeof path, "%s/examples/models/%s.safetensors", SOURCE_ROOT, names[i]);
-        FILE *f = fopen(path, "rb");
-        assert_non_null(f);
-        const size_t room = (size_t)1 << 22;
-        unsigned char *bytes = malloc(room);
-        const size_t size = fread(bytes, 1, room, f);
-        assert_true(size < room);
-        fclose(f);
+        size_t size;
+        unsigned char *bytes = shipped(names[i], &size);
         check_strays(bytes, size, i < 2 ? 2 : 3, true, true);
         free(bytes);
     }
@@ -305,6 +347,7 @@ int main(void)
         cmocka_unit_test(strays_leave_the_others_with_a_plain_last_layer),
         cmocka_unit_test(strays_fall_where_coarse_points_depend_on_all_particles),
         cmocka_unit_test(strays_fall_and_leave_the_others_with_the_projects_networks),
+        cmocka_unit_test(a_lattice_without_fluid_steps_and_one_of_a_particle_lets_it_fall),
         cmocka_unit_test(a_steady_step_with_strays_allocates_nothing),
         cmocka_unit_test(a_stray_beyond_all_numbers_is_named_and_nothing_moves),
     };
