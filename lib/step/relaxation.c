@@ -126,7 +126,7 @@ static double even_pairs(const relaxation *r, size_t entries)
     const double ratio = 1.0 / ((double)r->inverse_support * r->rows->radius);
     const double share =
         r->state->particles->dimension == 2 ? ratio * ratio : ratio * ratio * ratio;
-    return (share < 1.0 ? share : 1.0) * (double)entries + 4.0 * (double)r->count;
+    return (share < 1.0 ? share : 1.0) * (double)entries + 3.5 * (double)r->count;
 }
 
 /* Room for as many pairs as the last relaxation kept and some more; the first time for as many as there should be;
@@ -825,11 +825,10 @@ static ascc_status measure(relaxation *r, ascc_compression *to)
     return ASCC_OK;
 }
 
-static int64_t *lend_given(ascc_step_state *state)
+/* Room for impulses, [host's rows][dimension]: that of the velocities that the network saw, which nothing reads any more. */
+static int64_t *given_of(const ascc_step_state *state)
 {
-    const ascc_particles *p = state->particles;
-    return ascc_arena_lend(state->tools.arena, p->fluid_count * (size_t)p->dimension,
-                           sizeof(int64_t));
+    return (int64_t *)(void *)state->advance.velocity;
 }
 
 /* Positions before the step; false without memory. */
@@ -868,7 +867,7 @@ static ascc_status relax(ascc_step_state *state, relaxation *r, int64_t *given,
 {
     ascc_step_statistics *s = state->statistics;
     const bool first = state->relaxed.rounds == 1;
-    ascc_status status = given ? open_relaxation(r, state, false) : no_memory(state);
+    ascc_status status = open_relaxation(r, state, false);
     if (status == ASCC_OK && !find_lines(r))
         status = no_memory(state);
     if (status != ASCC_OK)
@@ -897,7 +896,7 @@ static ascc_status run_round(ascc_step_state *state, ascc_compression *found)
         return status;
     const ascc_arena_mark mark = ascc_arena_mark_of(state->tools.arena);
     relaxation r;
-    status = relax(state, &r, lend_given(state), found);
+    status = relax(state, &r, given_of(state), found);
     ascc_arena_return(state->tools.arena, mark);
     return status;
 }
@@ -921,7 +920,7 @@ ascc_status ascc_stage_relaxation(ascc_step_state *state)
 
 static ascc_status slow_down(ascc_step_state *state, relaxation *r, int64_t *given)
 {
-    ascc_status status = given ? open_relaxation(r, state, true) : no_memory(state);
+    ascc_status status = open_relaxation(r, state, true);
     if (status != ASCC_OK)
         return status;
     status = sweep(r, &r->constants->divergence);
@@ -950,7 +949,7 @@ ascc_status ascc_stage_divergence(ascc_step_state *state)
         return ASCC_OK;
     const ascc_arena_mark mark = ascc_arena_mark_of(state->tools.arena);
     relaxation r;
-    const ascc_status status = slow_down(state, &r, lend_given(state));
+    const ascc_status status = slow_down(state, &r, given_of(state));
     ascc_arena_return(state->tools.arena, mark);
     ascc_stage_lap(state, "divergence");
     return status;

@@ -24,9 +24,9 @@ typedef struct ascc_motion {
 
 /* One step's state while it is not yet the particles' own. All [fluid count][dimension]. */
 typedef struct ascc_advance {
-    double *seen;      /* where the network sees the fluid; its memory becomes position's */
-    double *position;  /* where it ends */
-    double *velocity;  /* after external forces: what the network sees */
+    double *seen;     /* where the network sees the fluid; its memory becomes position's */
+    double *position; /* where it ends */
+    double *velocity; /* after external forces: what the network sees; a relaxation overwrites it */
     int64_t *momentum; /* at the end */
     int64_t *external; /* impulse of gravity and acceleration, quanta */
     /* Where walls end, [boundary count][dimension]: the particles' own array while none moves. */
