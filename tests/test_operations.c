@@ -144,12 +144,6 @@ static void rows(int v, model_random *r)
     r->trunk_layers = 3;
 }
 
-static void gravity(int v, model_random *r)
-{
-    rows(v, r);
-    r->down = 1;
-}
-
 static void scale(int v, model_random *r)
 {
     rows(v, r);
@@ -230,7 +224,6 @@ static const recipe recipes[] = {
     {"interpolation", 0, 0, NULL, NULL}, /* likewise */
     {"dense", 4, 500, rows, NULL},
     {"identity", 4, 600, rows, NULL},
-    {"gravity", 4, 1300, gravity, NULL},
     {"transfer", 16, 700, transfer, NULL},
     {"pairs on a grid", 20, 800, pairs_grid, NULL},
     {"pairs in a basis", 32, 900, pairs_basis, NULL},

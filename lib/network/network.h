@@ -75,8 +75,6 @@ typedef struct ascc_network_run {
         guess; /* [fluid rows] the pressure that a relaxation begins with, 0 where none; NULL: it has none */
     ascc_arena_point
         before_layers; /* what was taken since is read by layers and the output alone */
-    float
-        gravity[8]; /* of the step, in units of the model's own (if that is 0: m/s^2), then zeros */
     size_t neighbor_count;
     uint32_t longest;
 } ascc_network_run;

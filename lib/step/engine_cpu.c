@@ -2,8 +2,6 @@
  * SPDX-License-Identifier: MIT */
 #include "engine.h"
 
-#include <math.h>
-
 /* Quanta per kilogram and unit of the network's output: the output is a displacement during the
  * model's time step; with another one, the velocity it stands for is scaled as an acceleration. */
 static ascc_impulse_scale impulse_scale(const ascc_step_state *state)
@@ -16,18 +14,6 @@ static ascc_impulse_scale impulse_scale(const ascc_step_state *state)
                           (state->motion->time_step * state->time_unit / plan->time_step) *
                           state->time_unit / state->length_unit / p->quantum;
     return scale;
-}
-
-/* How gravity differs from what the model was trained with. */
-static void tell_gravity(ascc_step_state *state)
-{
-    const ascc_plan *plan = state->network->plan;
-    double square = 0.0;
-    for (int32_t c = 0; c < plan->dimension; c++)
-        square += plan->gravity[c] * plan->gravity[c];
-    for (int32_t c = 0; c < plan->dimension; c++)
-        state->run.gravity[c] = (float)(state->motion->gravity[c] * state->length_unit /
-                                        (square > 0.0 ? sqrt(square) : 1.0));
 }
 
 /* Points of a level, of which each process tells its own. */
@@ -59,10 +45,8 @@ ascc_status ascc_engine_cpu(ascc_step_state *state)
         status = ascc_network_demand(&state->run, state->network, &state->hierarchy, &state->tools,
                                      state->expected);
     ascc_stage_lap(state, "search");
-    if (status == ASCC_OK) {
-        tell_gravity(state);
+    if (status == ASCC_OK)
         status = ascc_network_forward(&state->run, state->fluid_features, state->boundary_features);
-    }
     ascc_arena_return(state->tools.arena, state->before_features);
     ascc_stage_lap(state, "network");
     if (status == ASCC_OK) {

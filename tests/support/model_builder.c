@@ -340,16 +340,6 @@ static void add_dense(random_network *n, const char *name, const char *source, i
     add_weights(&n->builder, &n->state, name, n->o.dimension, 0, in, out, n->o.gain);
 }
 
-static void add_gravity(random_network *n, const char *name, const char *source, int out)
-{
-    const size_t shape[2] = {(size_t)n->o.dimension, (size_t)out};
-    char tensor[64];
-    snprintf(tensor, sizeof tensor, "%s.gravity", name);
-    model_text_add(&n->text, ",{\"type\":\"gravity\",\"source\":\"%s\",\"weight\":\"%s\"}", source,
-                   tensor);
-    add_random(&n->builder, &n->state, tensor, 2, shape, n->o.gain);
-}
-
 static void add_stencil(random_network *n, const char *name, const char *source,
                         const char *options, int in, int out)
 {
@@ -524,8 +514,6 @@ static void add_trunk_layer(random_network *n, int layer)
             if (width == c)
                 model_text_add(&n->text, ",{%s,\"source\":\"%s\"}",
                                n->o.residual ? n->o.residual : "\"type\":\"identity\"", source);
-            if (n->o.down)
-                add_gravity(n, name, source, width);
         }
         model_text_add(&n->text, "]}");
     }

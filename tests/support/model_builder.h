@@ -95,7 +95,6 @@ typedef struct model_random {
     int guess;   /* 1: a layer "guess" of one channel for the relaxation */
     const char *relaxation; /* JSON object; NULL = none */
     int direction; /* 1: the last layer's pairs act along their present line; bumps, fluid_only */
-    int down;      /* 1: gravity besides, where residuals are */
     const char *residual; /* type and members of a layer's residual; NULL = identity */
 } model_random;
 

@@ -442,19 +442,6 @@ static void add_product(const network_state *n, const ascc_term *term, size_t ce
                                     (size_t)b);
 }
 
-/* Gravity in units of the model's own. */
-static void add_gravity(const network_state *n, const ascc_term *term, double *out)
-{
-    const ascc_plan *plan = &n->o->model->plan;
-    const double *own = plan->gravity;
-    const double length = sqrt(own[0] * own[0] + own[1] * own[1] + own[2] * own[2]);
-    for (int32_t b = 0; b < term->outputs; b++)
-        for (int32_t c = 0; c < plan->dimension; c++)
-            out[b] += n->o->gravity[c] / length *
-                      weight_at(n->o, term->tensor[ASCC_TENSOR_WEIGHT],
-                                (size_t)c * (size_t)term->outputs + (size_t)b);
-}
-
 static double displacement(const point *to, const point *from, double d[3])
 {
     double square = 0.0;
@@ -811,8 +798,6 @@ static void add_term(const network_state *n, const ascc_layer *layer, const ascc
             term->operation == &ascc_op_identity || term->operation == &ascc_op_gather;
         if (term->operation == &ascc_op_dense)
             add_product(n, term, 0, in, out);
-        else if (term->operation == &ascc_op_gravity)
-            add_gravity(n, term, out);
         else if (term->operation == &ascc_op_normalize)
             normalize(n, term, in, out);
         else if (!adds)
