@@ -107,7 +107,7 @@ refuses 2 "'conv' is no command; did you mean 'convert'?" conv
 refuses 2 "'-x' is no option; ascc --help tells more" -x
 refuses 2 "'nothing-like-it' is no command; ascc --help tells more" help nothing-like-it
 # Every option that a help text tells is known where its last letter is missing.
-for command in sim show view generate lint eval relax train convert; do
+for command in sim show view generate lint eval relax trust train convert; do
     "$ascc" $command --help | grep -oE -e '--[a-z]{3,}[a-z-]*' | sort -u >options
     for option in $(grep -v -x -e --help options); do
         refuses 2 "unknown option: ${option%?}; did you mean '$option'?" $command "${option%?}" x
@@ -225,6 +225,23 @@ holds 'a ladder without time says that nothing is fast enough' grep -q 'over the
 run sim water2d.safetensors still-column-2d --size 8 -n 400 --sleep 1
 holds 'fluid at rest sleeps when it may' grep -q '^asleep  *[1-9]' out
 holds 'and no quantum is lost' grep -q '^momentum error  *0  (0 0 0 quanta' out
+run sim water2d.safetensors dam-break-2d --size 8 -n 20 --trust 0 --ply measured
+holds 'a network tells how far it is from its training' grep -qE '^from training  *[0-9.]+ times as far as usual' out
+holds 'and moves as without' diff -r measured alone
+run sim --ladder pbf2d.safetensors,water2d.safetensors --trust 0.01 dam-break-2d --size 8 -n 20
+holds 'a ladder falls back where a network is far from its training' grep -q '^  pbf2d.safetensors  *19 steps' out
+holds 'and says so' grep -q '^trust  *none in a network now' out
+run sim pbf2d.safetensors dam-break-2d --size 8 -n 5 --trust 0
+holds 'a model without a network says that it cannot tell' grep -q '^from training  *the model has no statistics' out
+refuses 2 '--trust takes a number from 0' sim demo dam-break-2d -n 1 --trust far
+refuses 1 'has no statistics of its training' sim --ladder "$root/examples/models/pbf3d.safetensors,$root/examples/models/paper3d.safetensors" --trust 1 dam-break-3d -n 1
+refuses 2 'a MODEL, a SEQUENCE and -o are wanted' trust water2d.safetensors -o t.safetensors
+refuses 2 'unknown option: --frame' trust water2d.safetensors a.safetensors --frame 3
+refuses 1 'nowhere.safetensors' trust nowhere.safetensors a.safetensors -o t.safetensors
+holds 'refused statistics leave no file' test ! -e t.safetensors
+run generate wbc2d -o g --seed 4 --count 1 --frames 8 --spacing 0.0125 --solver sph
+run trust water2d.safetensors g/wbc2d_4_0000.safetensors -o t.safetensors --frames 4 --threshold 3.5
+holds 'statistics of given sequences are in the file' sh -c '"$0" info t.safetensors | grep -q "errors double at 3.5"' "$ascc"
 refuses 2 '--sleep takes a number from 0' sim demo dam-break-2d -n 1 --sleep -1
 refuses 2 '--budget takes a --ladder' sim demo dam-break-2d -n 1 --budget 4
 refuses 1 "cannot open 'none'" sim --ladder none dam-break-2d -n 1

@@ -10,6 +10,7 @@ card() { [ -f "docs/models/$1.md" ] && grep -q '^## Measured' "docs/models/$1.md
 conserves() { "$ascc" info "$1" | grep -E "^ *conserves +$2"; }
 cheap() { "$ascc" info "$1" | awk -v most="$2" '/^ *cost/ { print; fine = $3 <= most } END { exit !fine }'; }
 # Two drops collide: no momentum is made or lost, in whole quanta.
+trusted() { "$ascc" info "$1" | grep -E '^ *trust .*errors double at [1-9]'; }
 exact() { "$ascc" sim "$1" "droplets-$2" --size 8 -n 60 -o "$folder/d" 2>&1 | grep 'momentum error *0  (0 0 0 quanta'; }
 turns() {
     "$ascc" sim "$1" "droplets-$2" --size 8 -n 60 -o "$folder/d" 2>&1 |
@@ -34,6 +35,7 @@ for dimension in 2d 3d; do
         check "$model says that it conserves momentum" conserves "$file" momentum
         check "$model conserves momentum to the bit when drops collide" exact "$file" $dimension
         check "$model gives the same bits on three threads" same "$file" $dimension
+        check "$model tells its distance from training" trusted "$file"
     done
     tiny=examples/models/water$dimension-tiny.safetensors
     check "water$dimension-tiny says that it conserves angular momentum" conserves "$tiny" 'momentum, angular momentum'

@@ -433,7 +433,8 @@ static void walk_steps(ascc_context *context, const ascc_model *model, ascc_part
     ascc_step *step;
     size_t size;
     const char *message;
-    GOOD(ascc_step_create(context, model, NULL, &step));
+    const ascc_step_options measured = {.size = sizeof measured, .measure_distance = 1};
+    GOOD(ascc_step_create(context, model, &measured, &step));
     BAD(ascc_step_create(context, NULL, NULL, &(ascc_step *){NULL}));
     DO(size = ascc_step_estimate(step, 1000, 1000));
     assert_true(size > 0);

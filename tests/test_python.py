@@ -95,6 +95,7 @@ class Header(unittest.TestCase):
             (ascc.ShapeKind, "ASCC_SHAPE_"),
             (ascc.Water, "ASCC_WATER_"),
             (ascc.DrainKind, "ASCC_DRAIN_"),
+            (ascc.LadderReason, "ASCC_LADDER_"),
         ):
             for item in enum:
                 name = "ASCC_OK" if item.name == "OK" else prefix + item.name
@@ -369,6 +370,17 @@ class Sets(Case):
             ascc.Step(self.model, context=ascc.Context(threads)).run(water, 10)
             hashes.add(water.hash())
         self.assertEqual(len(hashes), 1)
+
+
+    def test_a_step_tells_how_far_it_is_from_training(self):
+        self.set.add_fluid(ascc.block((0, 0), (8, 8), self.set.spacing))
+        for measure in (False, True):
+            step = ascc.Step(self.model, measure_distance=measure)
+            step.run(self.set)
+            told = step.statistics
+            knows = measure and self.model.info.tells_distance
+            self.assertEqual(told.distance_count, 64 if knows else 0)
+            self.assertEqual(told.distance_mean > 0, knows)
 
 
 class Ladders(Case):

@@ -620,6 +620,101 @@ static void without_memory_nothing_is_measured_and_it_is_said(void **state)
     free(m);
 }
 
+/* ---- Statistics of training, which steps are measured by ---- */
+
+/* The mean distance of the sequence's states by a step of the model with these statistics. */
+static double distance_of_states(const void *bytes, size_t size, const char *text, const motion *m)
+{
+    ascc_context *context;
+    ascc_model *model = NULL;
+    ascc_message message;
+    double sum = 0.0;
+    uint64_t count = 0;
+    assert_int_equal(ascc_context_create(NULL, &context), ASCC_OK);
+    assert_int_equal(ascc_model_load_memory(context, bytes, size, &model), ASCC_OK);
+    assert_int_equal(model->trust.layer, -1);
+    const unsigned char *data = bytes;
+    const size_t header = 8 + data[0] + ((size_t)data[1] << 8) + ((size_t)data[2] << 16);
+    assert_int_equal(ascc_trust_read(&context->allocator, text,
+                                     ascc_trust_sum(data + header, size - header), &model->plan,
+                                     &model->trust, &message),
+                     ASCC_OK);
+    assert_int_equal(model->trust.layer, ascc_trust_layer(&model->plan));
+    assert_true(model->trust.threshold == 1.25);
+    const ascc_step_options options = {.size = sizeof options, .measure_distance = 1};
+    for (size_t t = 1; t + 1 < FRAMES; t++) {
+        ascc_particles_options set = {.size = sizeof set};
+        ascc_particles *p;
+        ascc_step *step;
+        ascc_step_statistics told = {.size = sizeof told};
+        const size_t d = m->dimension;
+        const ascc_const_array x = {.data = m->position + t * m->fluid_count * d};
+        const ascc_const_array v = {.data = m->velocity, .scalar = ASCC_DOUBLE};
+        const ascc_const_array wall = {.data = m->wall}, normal = {.data = m->normal};
+        assert_int_equal(ascc_model_particles_options(model, 0, &set), ASCC_OK);
+        assert_int_equal(ascc_particles_create(context, &set, &p), ASCC_OK);
+        assert_int_equal(ascc_particles_add_fluid(p, m->fluid_count, &x, &v, NULL, NULL), ASCC_OK);
+        assert_int_equal(ascc_particles_add_boundary(p, m->wall_count, &wall, &normal, 0, NULL),
+                         ASCC_OK);
+        assert_int_equal(ascc_step_create(context, model, &options, &step), ASCC_OK);
+        const ascc_forces forces = {.size = sizeof forces, .gravity = m->sequence.gravity};
+        assert_int_equal(ascc_step_run(step, p, &forces, 1), ASCC_OK);
+        assert_int_equal(ascc_step_get_statistics(step, &told), ASCC_OK);
+        sum += told.distance_mean * (double)told.distance_count;
+        count += told.distance_count;
+        ascc_step_destroy(&step);
+        ascc_particles_destroy(&p);
+    }
+    ascc_model_destroy(&model);
+    ascc_context_destroy(&context);
+    return sum / (double)count;
+}
+
+/* A sequence's states are measured by a step as training measured them: 1 in the mean, but for which of them
+ * were drawn, and for velocities that are differences of floats. */
+static void states_of_training_are_as_far_as_usual(void **state)
+{
+    (void)state;
+    const model_random networks[] = {bases(5, 2), moments(6, 3), lattice(7, 3)};
+    for (size_t k = 0; k < sizeof networks / sizeof *networks; k++) {
+        motion *m = make_motion(40 + k, (size_t)networks[k].dimension, 12);
+        const ascc_trainer_options options = options_of(-1);
+        ascc_trainer *t = open_trainer(&options, &networks[k], m);
+        iterate(t, 2);
+        const char *text = ascc_trainer_trust(t, 0, 200, 1.25);
+        assert_non_null(text);
+        char *kept = strdup(text);
+        assert_string_equal(kept, ascc_trainer_trust(t, 0, 200, 1.25));
+        assert_string_not_equal(kept, ascc_trainer_trust(t, 1, 200, 1.25)); /* averaged weights */
+        size_t size;
+        const void *bytes = ascc_trainer_model(t, 0, &size);
+        const double mean = distance_of_states(bytes, size, kept, m);
+        print_message("# distance of training's states: %.4f\n", mean);
+        assert_true(fabs(mean - 1.0) < 0.05);
+        ascc_trainer_destroy(&t);
+        free(kept);
+        free(m);
+    }
+}
+
+static void statistics_that_cannot_be_taken_are_refused(void **state)
+{
+    (void)state;
+    const model_random network = bases(5, 2);
+    motion *m = make_motion(9, 2, 12);
+    const ascc_trainer_options options = options_of(-1);
+    ascc_trainer *t = open_trainer(&options, &network, m);
+    assert_null(ascc_trainer_trust(NULL, 0, 10, 0.0));
+    assert_null(ascc_trainer_trust(t, 0, 0, 0.0));
+    assert_non_null(strstr(ascc_trainer_message(t), "frames"));
+    assert_null(ascc_trainer_trust(t, 0, 10001, 0.0));
+    assert_null(ascc_trainer_trust(t, 0, 10, -1.0));
+    assert_null(ascc_trainer_trust(t, 0, 10, NAN));
+    assert_non_null(ascc_trainer_trust(t, 0, 10, 0.0));
+    ascc_trainer_destroy(&t);
+    free(m);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -633,6 +728,8 @@ int main(void)
         cmocka_unit_test(a_saved_state_goes_on_with_its_own_whitening),
         cmocka_unit_test(columns_that_do_not_vary_stay_as_they_are),
         cmocka_unit_test(without_memory_nothing_is_measured_and_it_is_said),
+        cmocka_unit_test(states_of_training_are_as_far_as_usual),
+        cmocka_unit_test(statistics_that_cannot_be_taken_are_refused),
     };
     return cmocka_run_group_tests_name("whitening", tests, NULL, NULL);
 }

@@ -22,7 +22,7 @@ _ascc() {
         case $command in
         sim | view) words="demo $(_ascc_models "$program") $("$program" sim --help | grep -oE '[a-z-]+-[23]d')" ;;
         eval) words="ballistic sph: pbf: demo $(_ascc_models "$program")" ;;
-        info | relax) words=$(_ascc_models "$program") ;;
+        info | relax | trust) words=$(_ascc_models "$program") ;;
         generate) words=$("$program" generate --help | sed -n 's/^  \([a-z0-9-]*\)  .*/\1/p') ;;
         *) words= ;;
         esac

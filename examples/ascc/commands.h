@@ -12,6 +12,7 @@ int ascc_command_generate(int argc, char **argv);
 int ascc_command_lint(int argc, char **argv);
 int ascc_command_eval(int argc, char **argv);
 int ascc_command_relax(int argc, char **argv);
+int ascc_command_trust(int argc, char **argv);
 int ascc_command_train(int argc, char **argv);
 int ascc_command_convert(int argc, char **argv);
 

@@ -39,6 +39,12 @@ static void print_model(const char *path, const ascc_model_info *m)
     ascc_line(stdout,
               "  in one step       at most %g s, gravity %g spacings / step^2, ways of %g spacings",
               m->time_step_max, m->gravity_max, m->way_max);
+    if (m->tells_distance && m->distance_threshold > 0.0)
+        ascc_line(stdout,
+                  "  trust             tells the distance from training; errors double at %g",
+                  m->distance_threshold);
+    else if (m->tells_distance)
+        ascc_line(stdout, "  trust             tells the distance from training");
 }
 
 static void print_sequence(const char *path, const ascc_sequence *s)

@@ -23,6 +23,7 @@ static const struct {
     {"lint", "check sequences for spikes, escapes and clumps", ascc_command_lint},
     {"eval", "measure a method on true sequences", ascc_command_eval},
     {"relax", "give a model file a relaxation", ascc_command_relax},
+    {"trust", "give a model file statistics of its training", ascc_command_trust},
     {"train", "train a network over rollouts", ascc_command_train},
     {"convert", "a published network as a model file, a sequence as PLY or VTK",
      ascc_command_convert},

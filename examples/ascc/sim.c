@@ -23,7 +23,8 @@ typedef struct options {
     const char *rungs; /* models by name, commas between them, in place of one */
     double budget;     /* ms a step, 0 = none */
     int32_t steps, every, threads, size;
-    double time_step, spacing, sleep_speed;
+    double time_step, spacing, sleep_speed, max_distance;
+    bool trust;            /* measured */
     int32_t gravity_count; /* 0 = the scene's */
     bool difference;
     double gravity[3];
@@ -39,31 +40,36 @@ static void usage(FILE *to)
         "       model, not trained)\n"
         "SCENE  a sequence file, whose first frame starts the run, or one of (3D without -2d)\n");
     ascc_scene_list(to);
-    fprintf(to,
-            "\n"
-            "  -n STEPS           time steps\n"
-            "  -o OUT             a sequence file of all frames\n"
-            "  --frames DIR       one PNG picture a frame\n"
-            "  --ply DIR          one binary PLY file a frame\n"
-            "  --vtk DIR          one VTK file a frame, and frames.pvd for ParaView\n"
-            "  --every K          a frame every K steps (1)\n"
-            "  --threads N        threads to use (1)\n"
-            "  --dt S             time step, seconds (the model's)\n"
-            "  --gravity X,Y[,Z]  m/s^2 (the scene's)\n"
-            "  --ladder M,M...    several models, the best last: each step runs the best that the\n"
-            "                     budget allows\n"
-            "  --budget MS        milliseconds that a step may take, for --ladder\n"
-            "  --sleep V          parts of the fluid slower than V times what gravity gives in a\n"
-            "                     step stop until something wakes them (0 = none)\n"
-            "  --size N           particles along a named scene's longest edge\n"
-            "  --spacing S        particle spacing of a named scene, metres (the model's)\n"
-            "  --velocity KIND    of a sequence: stored (default), or difference of its first\n"
-            "                     two frames, starting from the second\n");
+    fprintf(
+        to,
+        "\n"
+        "  -n STEPS           time steps\n"
+        "  -o OUT             a sequence file of all frames\n"
+        "  --frames DIR       one PNG picture a frame\n"
+        "  --ply DIR          one binary PLY file a frame\n"
+        "  --vtk DIR          one VTK file a frame, and frames.pvd for ParaView\n"
+        "  --every K          a frame every K steps (1)\n"
+        "  --threads N        threads to use (1)\n"
+        "  --dt S             time step, seconds (the model's)\n"
+        "  --gravity X,Y[,Z]  m/s^2 (the scene's)\n"
+        "  --ladder M,M...    several models, the best last: each step runs the best that the\n"
+        "                     budget allows\n"
+        "  --budget MS        milliseconds that a step may take, for --ladder\n"
+        "  --sleep V          parts of the fluid slower than V times what gravity gives in a\n"
+        "                     step stop until something wakes them (0 = none)\n"
+        "  --trust X          tells how far what the model sees is from what it was trained on;\n"
+        "                     with --ladder: beyond X, the best model below without a network\n"
+        "                     runs (0 = any distance)\n"
+        "  --size N           particles along a named scene's longest edge\n"
+        "  --spacing S        particle spacing of a named scene, metres (the model's)\n"
+        "  --velocity KIND    of a sequence: stored (default), or difference of its first\n"
+        "                     two frames, starting from the second\n");
 }
 
 static const char *const option_names[] = {
-    "-n",        "-o",     "--frames",  "--ply",      "--vtk",   "--every",  "--threads", "--dt",
-    "--gravity", "--size", "--spacing", "--velocity", "--sleep", "--ladder", "--budget",  NULL};
+    "-n",        "-o",       "--frames",  "--ply",   "--vtk",     "--every",
+    "--threads", "--dt",     "--gravity", "--size",  "--spacing", "--velocity",
+    "--sleep",   "--ladder", "--budget",  "--trust", NULL};
 
 static bool bad_use(const char *what, const char *value)
 {
@@ -129,6 +135,13 @@ static bool read_option(options *o, const char *name, const char *value)
         o->sleep_speed = strtod(value, &end);
         return (end != value && !*end && o->sleep_speed >= 0.0 && o->sleep_speed <= 1e3) ||
                bad_use("--sleep takes a number from 0 to 1000", value);
+    }
+    if (strcmp(name, "--trust") == 0) {
+        char *end;
+        o->max_distance = strtod(value, &end);
+        o->trust = true;
+        return (end != value && !*end && o->max_distance >= 0.0 && o->max_distance <= 1e6) ||
+               bad_use("--trust takes a number from 0 to 1000000", value);
     }
     if (strcmp(name, "--velocity") == 0)
         return bad_use("--velocity takes stored or difference", value);
@@ -221,6 +234,8 @@ typedef struct simulation {
     int32_t stage_count;
     int64_t drift[3]; /* quanta: what is left of before + external - wall - support - after */
     uint64_t asleep;  /* in the last step */
+    double distance_sum, distance_most, distance_worst; /* of steps' means; of a particle */
+    uint64_t distance_steps;
     ascc_measures first, last;
     double max_density;
     bool stopped; /* interrupted on some process */
@@ -284,6 +299,16 @@ static void add_stage(simulation *s, const ascc_stage_time *stage)
     s->seconds[i] += stage->seconds;
 }
 
+static void add_distance(simulation *s, uint64_t count, double mean, double worst)
+{
+    if (count == 0)
+        return;
+    s->distance_sum += mean;
+    s->distance_steps++;
+    s->distance_most = fmax(s->distance_most, mean);
+    s->distance_worst = fmax(s->distance_worst, worst);
+}
+
 static ascc_status run_step(simulation *s, const ascc_forces *forces)
 {
     return s->ladder ? ascc_ladder_run(s->ladder, s->particles, forces, 1)
@@ -302,6 +327,7 @@ static void count_step(simulation *s)
         add_stage(s, &t.stage[i]);
     s->seconds_total += t.seconds_total;
     s->asleep = t.asleep;
+    add_distance(s, t.distance_count, t.distance_mean, t.distance_worst);
     for (int c = 0; c < 3; c++)
         s->drift[c] += t.momentum_before[c] + t.external_impulse[c] - t.wall_impulse[c] -
                        t.support_impulse[c] - t.momentum_after[c];
@@ -421,6 +447,8 @@ static void print_ladder(const simulation *s)
         ascc_line(stdout, "  %-17s %9" PRIu64 " steps, %.3f ms expected now", s->rung_name[r],
                   l.steps_on[r], 1e3 * l.predicted[r]);
     ascc_line(stdout, "changes of model    %" PRIu64 ", at most one a second simulated", l.changes);
+    if (l.reason == ASCC_LADDER_STRANGE)
+        ascc_line(stdout, "trust               none in a network now: too far from its training");
     if (l.budget > 0.0)
         ascc_line(stdout, "over the budget     %" PRIu64 " of %d steps took more than %g ms%s",
                   l.late, s->steps, 1e3 * l.budget,
@@ -445,6 +473,14 @@ static void print_table(const simulation *s)
         ascc_line(stdout, "  %-17s %9.3f us a step", "per particle",
                   1e6 * s->seconds_total / n / (double)s->scene.count);
     print_ladder(s);
+    if (s->distance_steps)
+        ascc_line(
+            stdout,
+            "from training       %.2f times as far as usual in the mean, %.2f in the farthest "
+            "step; farthest particle %.1f",
+            s->distance_sum / (double)s->distance_steps, s->distance_most, s->distance_worst);
+    else if (s->o->trust)
+        ascc_line(stdout, "from training       the model has no statistics of it");
     if (s->o->sleep_speed > 0.0)
         ascc_line(stdout, "asleep              %" PRIu64 " of %zu particles in the last step",
                   s->asleep, s->scene.count);
@@ -565,10 +601,14 @@ static bool open_particles(simulation *s)
 
 static bool open_step(simulation *s)
 {
-    const ascc_step_options settings = {
-        .size = sizeof settings, .time_step = s->o->time_step, .sleep_speed = s->o->sleep_speed};
-    const ascc_ladder_options ladder = {
-        .size = sizeof ladder, .budget = 1e-3 * s->o->budget, .step = &settings};
+    const ascc_step_options settings = {.size = sizeof settings,
+                                        .time_step = s->o->time_step,
+                                        .sleep_speed = s->o->sleep_speed,
+                                        .measure_distance = s->o->trust};
+    const ascc_ladder_options ladder = {.size = sizeof ladder,
+                                        .budget = 1e-3 * s->o->budget,
+                                        .step = &settings,
+                                        .max_distance = s->o->max_distance};
     const ascc_status status =
         s->o->rungs ? ascc_ladder_create(s->context, s->rung_count,
                                          (const ascc_model *const *)s->rung, &ladder, &s->ladder)

@@ -210,6 +210,9 @@ typedef struct ascc_model_info {
     /* Likewise gravity, g dt^2 / h, and the way of a particle, in spacings a step; a step is cut into substeps
      * that stay within (ascc_step_options.substeps). INFINITY = not said. */
     double gravity_min, gravity_max, way_max;
+    int32_t tells_distance; /* 1 = the file has what ascc_step_options.measure_distance needs */
+    int32_t reserved2;
+    double distance_threshold; /* of a mean distance, at which errors double; 0 = not stated */
 } ascc_model_info;
 
 ASCC_API ascc_status ascc_model_get_info(const ascc_model *model, ascc_model_info *info);
@@ -688,6 +691,10 @@ typedef struct ascc_step_options {
     /* Parts of the fluid that stay slower for half a second stop, until something wakes them (docs/sleeping.md);
      * in speeds that gravity gives in a time step: 0.5 is a good one. 0 = none stops, and what had stopped wakes. */
     double sleep_speed;
+    /* 1: the statistics tell how far what a step sees is from what the model was trained on (docs/trust.md), if the
+     * model can tell (ascc_model_info.tells_distance). Costs 1 to 2 % of a step, and changes nothing of it. */
+    int32_t measure_distance;
+    int32_t reserved;
 } ascc_step_options;
 
 /**
@@ -786,6 +793,11 @@ typedef struct ascc_step_statistics {
      * before + external - wall - support = after. */
     uint64_t asleep;
     int64_t support_impulse[3];
+    /* Of the last step, with measure_distance: how far what fluid particles see is from what the model was trained
+     * on, 1 = as far as there in the mean; in the mean over distance_count particles (0: nothing was measured), and
+     * of the worst, whose row of the fluid distance_row was as the step began. */
+    double distance_mean, distance_worst;
+    uint64_t distance_row, distance_count;
 } ascc_step_statistics;
 
 ASCC_API ascc_status ascc_step_get_statistics(const ascc_step *step,
@@ -809,6 +821,10 @@ typedef struct ascc_ladder_options {
     double (*clock)(void *user);
     void *user;                    /* handed to the clock */
     const ascc_step_options *step; /* of all rungs; NULL = defaults */
+    /* Mean distance of what a network sees from what it was trained on (docs/trust.md) beyond which the next steps
+     * run on the best rung below that has no network, such as pbf3d, `dwell` long at least. ascc_model_info has one
+     * to begin with. 0 = none. */
+    double max_distance;
 } ascc_ladder_options;
 
 /** Why the last step ran on its rung. */
@@ -819,6 +835,7 @@ typedef enum ascc_ladder_reason {
     ASCC_LADDER_WAITS = 3,    /* another one is wanted, but the last change is not `dwell` ago */
     ASCC_LADDER_TOO_SLOW = 4, /* the budget is exceeded, and no rung is faster */
     ASCC_LADDER_GIVEN = 5,    /* by ascc_ladder_replay */
+    ASCC_LADDER_STRANGE = 6, /* what the fluid does is too far from what a network was trained on */
 } ascc_ladder_reason;
 
 /**
@@ -827,7 +844,8 @@ typedef enum ascc_ladder_reason {
  * models    [count], 1 to ASCC_MAX_RUNGS, the best last: such as pbf3d, water3d, water3d-large. Of one
  *           dimension, spacing, gravity, and time step unless options->step says one. May be destroyed before.
  * options   NULL for all defaults; read during the call.
- * errors    ARGUMENT, MISMATCH (models that do not go together), MEMORY.
+ * errors    ARGUMENT, MISMATCH (models that do not go together; with max_distance: a network that cannot tell its
+ *           distance, or without a rung below that has none), MEMORY.
  * cost      each rung holds a step with its own scratch.
  * threads   one thread at a time per ladder and per particle set.
  */
@@ -881,6 +899,9 @@ typedef struct ascc_ladder_statistics {
     /* Of the last run, quanta of momentum, exact, as in ascc_step_statistics. */
     int64_t momentum_before[3], momentum_after[3], external_impulse[3], wall_impulse[3];
     int64_t support_impulse[3];
+    /* As in ascc_step_statistics, of the last step whose rung is measured, with max_distance or measure_distance. */
+    double distance_mean, distance_worst;
+    uint64_t distance_row, distance_count;
 } ascc_ladder_statistics;
 
 ASCC_API ascc_status ascc_ladder_get_statistics(const ascc_ladder *ladder,

@@ -177,6 +177,22 @@ ASCC_API ascc_status ascc_trainer_set_parameters(ascc_trainer *trainer, const fl
  * call that changes the trainer. NULL without memory. */
 ASCC_API const void *ascc_trainer_model(ascc_trainer *trainer, int32_t averaged, size_t *size);
 
+/**
+ * What the first layer of the model makes of the states it learns from: the text of `trust` in a model file's
+ * metadata (docs/file-format.md), by which steps tell how far their input is from training's. It holds for these
+ * weights alone: a file with others does not read it.
+ *
+ * averaged   as of ascc_trainer_model: whose statistics these are
+ * frames     true states that are drawn from the sequences, turned and mirrored as in training; 1 to 10,000
+ * threshold  mean distance at which errors double, if known; 0 = not stated
+ *
+ * Returns the text, the trainer's, valid until its next call; NULL on error: ARGUMENT (also a model without a layer
+ * on the fluid with weights and at most 64 channels), MEMORY, RANGE, told by ascc_trainer_message.
+ * cost       that many steps, on one thread.
+ */
+ASCC_API const char *ascc_trainer_trust(ascc_trainer *trainer, int32_t averaged, int32_t frames,
+                                        double threshold);
+
 /** Iterations done. */
 ASCC_API uint64_t ascc_trainer_iteration(const ascc_trainer *trainer);
 

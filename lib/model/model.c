@@ -87,6 +87,16 @@ static ascc_status read_plan(ascc_safetensors *file, ascc_plan_builder *builder,
     return ascc_description_read(builder, network);
 }
 
+/* Tensors are the end of the file, one after another. */
+static ascc_status read_trust(ascc_model *model, ascc_safetensors *file, ascc_message *message)
+{
+    const char *text = ascc_safetensors_metadata(file, "trust");
+    const unsigned char *data = file->tensor_count ? file->tensor[0].data : NULL;
+    const size_t count = data ? (size_t)(model->bytes + model->byte_count - data) : 0;
+    return ascc_trust_read(&model->context->allocator, text, text ? ascc_trust_sum(data, count) : 0,
+                           &model->plan, &model->trust, message);
+}
+
 static ascc_status read_model(ascc_model *model, ascc_message *message)
 {
     const ascc_allocator *allocator = &model->context->allocator;
@@ -104,6 +114,8 @@ static ascc_status read_model(ascc_model *model, ascc_message *message)
                 ascc_plan_finish(&builder, &model->plan, &model->weights, &model->weight_count);
         ascc_plan_close(&builder);
     }
+    if (status == ASCC_OK)
+        status = read_trust(model, &file, message);
     if (status == ASCC_OK)
         status = ascc_packed_create(&model->packed, allocator, &model->plan, message);
     ascc_safetensors_close(&file);
@@ -276,6 +288,8 @@ ascc_status ascc_model_get_info(const ascc_model *model, ascc_model_info *info)
         .gravity_max = plan->gravity_max,
         .way_max = plan->way_max,
         .multiply_adds = ascc_cost(plan, &counts),
+        .tells_distance = model->trust.layer >= 0,
+        .distance_threshold = model->trust.layer >= 0 ? model->trust.threshold : 0.0,
     };
     return ascc_write_struct(info, &own, sizeof own, sizeof own) ? ASCC_OK : ASCC_ERROR_ARGUMENT;
 }

@@ -3,6 +3,7 @@
 #define ASCC_MODEL_H
 
 #include "packed.h"
+#include "trust.h"
 
 struct ascc_model {
     uint32_t magic;
@@ -14,6 +15,7 @@ struct ascc_model {
     size_t weight_count;
     ascc_plan plan;
     ascc_packed packed;
+    ascc_trust trust;
 };
 
 void ascc_model_retain(ascc_model *model);

@@ -78,16 +78,14 @@ static void copy_own(ascc_mpi_particles *set)
         from += set->counts[r];
         to += set->counts[ranks + (size_t)r];
     }
-    if (set->counts[set->rank])
-        memcpy((corner *)set->incoming.at + to, (corner *)set->outgoing.at + from,
-               set->counts[set->rank] * sizeof(corner));
+    memcpy((corner *)set->incoming.at + to, (corner *)set->outgoing.at + from,
+           set->counts[set->rank] * sizeof(corner));
 }
 
 static size_t sort_corners(corner *all, size_t count)
 {
     size_t kept = 0;
-    if (count)
-        qsort(all, count, sizeof *all, by_place);
+    qsort(all, count, sizeof *all, by_place);
     for (size_t i = 0; i < count; i++)
         if (kept == 0 || by_place(&all[i], &all[kept - 1]) != 0)
             all[kept++] = all[i];

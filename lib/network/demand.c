@@ -178,6 +178,13 @@ ascc_status ascc_network_create(ascc_network *network, const ascc_allocator *all
     return ASCC_OK;
 }
 
+void ascc_network_look_at(ascc_network *network, int32_t layer)
+{
+    network->looked_at = layer + 2;
+    network->wants[layer + 2] |= ASCC_WANTS_RAW;
+    network->last_reader[layer + 2] = network->plan->layer_count;
+}
+
 void ascc_network_destroy(ascc_network *network)
 {
     const ascc_allocator *a = network->allocator;

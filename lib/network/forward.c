@@ -69,7 +69,7 @@ bool ascc_network_passes_on(const ascc_network *network, int32_t l)
     const ascc_plan *plan = network->plan;
     bool read = false;
     if (network->keeps_values || plan->output.term.source == l + 2 ||
-        plan->relaxation.guess == l + 2)
+        plan->relaxation.guess == l + 2 || network->looked_at == l + 2)
         return false;
     for (int32_t m = l + 1; m < plan->layer_count; m++)
         for (int32_t t = 0; t < plan->layer[m].term_count; t++)

@@ -34,6 +34,7 @@ typedef struct ascc_network {
     uint8_t *wants;            /* [value_count] ASCC_WANTS_* */
     int32_t *last_reader;      /* [value_count] layers; layer_count: the output or the relaxation */
     int32_t max_neighbors;     /* of a point, before LIMIT */
+    int32_t looked_at;         /* value that is kept as it is, whoever reads it; 0 = none */
     bool
         keeps_values; /* also those that readers are given tile by tile: for a way back, as all of a step then */
 } ascc_network;
@@ -42,6 +43,8 @@ ascc_status ascc_network_create(ascc_network *network, const ascc_allocator *all
                                 const ascc_plan *plan, const ascc_packed *packed,
                                 int32_t max_neighbors, ascc_message *message);
 void ascc_network_destroy(ascc_network *network);
+/* From now on this layer's value is kept as it is, for one who reads it after the network. */
+void ascc_network_look_at(ascc_network *network, int32_t layer);
 
 static inline int32_t ascc_network_set(const ascc_network *network, int32_t value)
 {

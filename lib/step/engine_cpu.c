@@ -49,6 +49,10 @@ ascc_status ascc_engine_cpu(ascc_step_state *state)
         status = ascc_network_forward(&state->run, state->fluid_features, state->boundary_features);
     ascc_arena_return(state->tools.arena, state->before_features);
     ascc_stage_lap(state, "network");
+    if (status == ASCC_OK)
+        ascc_measure_trust(state);
+    if (state->looks)
+        return status;
     if (status == ASCC_OK) {
         const ascc_impulse_scale scale = impulse_scale(state);
         status = state->network->plan->output.term.operation->impulses(

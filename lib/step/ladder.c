@@ -8,7 +8,7 @@
 
 #include "commit.h"
 
-_Static_assert(sizeof(void *) != 8 || sizeof(ascc_ladder_options) == 48, "released layout");
+_Static_assert(sizeof(void *) != 8 || sizeof(ascc_ladder_options) == 56, "released layout");
 _Static_assert(sizeof(void *) != 8 || sizeof(ascc_ladder_statistics) % 8 == 0,
                "no padding at the end");
 
@@ -71,17 +71,45 @@ static ascc_status check_models(const ascc_model *const *models, size_t count, b
     return ASCC_OK;
 }
 
+/* Has it a network, whose input may be strange to it? */
+static bool has_network(const ascc_model *model)
+{
+    return model->plan.layer_count > 0;
+}
+
+/* Networks tell how far their input is from training's, and have a rung without one below. */
+static ascc_status check_distances(const ascc_model *const *models, size_t count,
+                                   ascc_message *message)
+{
+    bool refuge = false;
+    for (size_t i = 0; i < count; i++) {
+        if (has_network(models[i]) && models[i]->trust.layer < 0)
+            return ascc_fail(message, ASCC_ERROR_MISMATCH,
+                             "max_distance: rung %zu, %s, has no statistics of its training "
+                             "('ascc trust' gives it some)",
+                             i, ascc_quote(models[i]->plan.name).text);
+        if (has_network(models[i]) && !refuge)
+            return ascc_fail(message, ASCC_ERROR_MISMATCH,
+                             "max_distance: below rung %zu there is none without a network", i);
+        refuge |= !has_network(models[i]);
+    }
+    return ASCC_OK;
+}
+
 static ascc_status read_options(const ascc_ladder_options *given, ascc_ladder_options *o,
                                 ascc_message *message)
 {
     *o = (ascc_ladder_options){0};
-    if (given && !ascc_read_struct(o, sizeof *o, given, sizeof *o))
+    if (given &&
+        !ascc_read_struct(o, sizeof *o, given, offsetof(ascc_ladder_options, max_distance)))
         return ascc_fail(message, ASCC_ERROR_ARGUMENT,
                          "ascc_ladder_options.size is not understood");
-    if (!(o->budget >= 0.0 && isfinite(o->budget)) || !(o->dwell >= 0.0 && isfinite(o->dwell)))
-        return ascc_fail(message, ASCC_ERROR_ARGUMENT,
-                         "ladder options: budget %g, dwell %g: each must be finite and >= 0",
-                         o->budget, o->dwell);
+    if (!(o->budget >= 0.0 && isfinite(o->budget)) || !(o->dwell >= 0.0 && isfinite(o->dwell)) ||
+        !(o->max_distance >= 0.0 && isfinite(o->max_distance)))
+        return ascc_fail(
+            message, ASCC_ERROR_ARGUMENT,
+            "ladder options: budget %g, dwell %g, max_distance %g: each must be finite and >= 0",
+            o->budget, o->dwell, o->max_distance);
     return ASCC_OK;
 }
 
@@ -101,8 +129,18 @@ static ascc_status make_rungs(ascc_ladder *ladder, const ascc_model *const *mode
                               const ascc_ladder_options *o)
 {
     ascc_status status = ASCC_OK;
+    ascc_step_options options = {.size = sizeof options};
+    if (o->step && !ascc_read_struct(&options, sizeof options, o->step,
+                                     offsetof(ascc_step_options, sleep_speed))) {
+        ascc_message message;
+        status =
+            ascc_fail(&message, ASCC_ERROR_ARGUMENT, "ascc_step_options.size is not understood");
+        return ascc_context_fail(ladder->context, status, &message);
+    }
+    options.size = sizeof options;
+    options.measure_distance |= o->max_distance > 0.0;
     for (size_t i = 0; i < count && status == ASCC_OK; i++) {
-        status = ascc_step_create(ladder->context, models[i], o->step, &ladder->rung[i]);
+        status = ascc_step_create(ladder->context, models[i], &options, &ladder->rung[i]);
         ladder->count += status == ASCC_OK;
     }
     if (status != ASCC_OK)
@@ -114,6 +152,7 @@ static ascc_status make_rungs(ascc_ladder *ladder, const ascc_model *const *mode
     ladder->clock = o->clock;
     ladder->user = o->user;
     ladder->budget = o->budget;
+    ladder->max_distance = o->max_distance;
     ladder->statistics.rung_count = ladder->count;
     ladder->statistics.rung = ladder->choice.rung;
     return ASCC_OK;
@@ -132,6 +171,8 @@ ascc_status ascc_ladder_create(ascc_context *context, size_t count, const ascc_m
     ascc_status status = read_options(options, &o, &message);
     if (status == ASCC_OK)
         status = check_models(models, count, !(o.step && o.step->time_step > 0.0), &message);
+    if (status == ASCC_OK && o.max_distance > 0.0)
+        status = check_distances(models, count, &message);
     ascc_ladder *made = NULL;
     if (status == ASCC_OK) {
         made = ascc_allocate(&context->allocator, 1, sizeof *made);
@@ -232,12 +273,68 @@ static void tell(const ascc_ladder *ladder, int32_t before, int32_t reason_befor
         ascc_fail(&line, ASCC_OK,
                   "ladder: %s takes longer than the budget of %g s, and no rung is faster",
                   name_of(ladder, choice->rung), ladder->budget);
+    else if (choice->rung != before && choice->reason == ASCC_LADDER_STRANGE)
+        ascc_fail(&line, ASCC_OK,
+                  "ladder: from %s to %s: what the fluid does is %.3g times as far as usual from "
+                  "what the former was trained on",
+                  name_of(ladder, before), name_of(ladder, choice->rung),
+                  ladder->statistics.distance_mean);
     else if (choice->rung != before && ladder->change_count > 0)
         ascc_fail(&line, ASCC_OK, "ladder: from %s to %s, for a budget of %g s",
                   name_of(ladder, before), name_of(ladder, choice->rung), ladder->budget);
     else
         return;
     ascc_context_log(ladder->context, line.text);
+}
+
+/* ---- Trust ---- */
+
+/* Takes over how far from its training a rung has seen its input. */
+static void note_distance(ascc_ladder *ladder, int32_t rung)
+{
+    const ascc_step_statistics *from = &ladder->rung[rung]->statistics;
+    ascc_ladder_statistics *s = &ladder->statistics;
+    if (!ladder->rung[rung]->measures)
+        return;
+    s->distance_mean = from->distance_mean;
+    s->distance_worst = from->distance_worst;
+    s->distance_row = from->distance_row;
+    s->distance_count = from->distance_count;
+}
+
+/* The best rung below this one that has no network. */
+static int32_t refuge_of(const ascc_ladder *ladder, int32_t rung)
+{
+    while (rung > 0 && has_network(ladder->rung[rung]->model))
+        rung--;
+    return rung;
+}
+
+static void doubt_if_strange(ascc_ladder *ladder, int32_t rung)
+{
+    if (ladder->max_distance > 0.0 && ladder->rung[rung]->measures &&
+        !(ladder->statistics.distance_mean <= ladder->max_distance))
+        ascc_rung_choice_doubt(&ladder->choice, rung, refuge_of(ladder, rung));
+}
+
+/* Doubts last a dwell; then the network that had them looks again, once for each dwell. */
+static ascc_status look_again(ascc_ladder *ladder, ascc_particles *p, const ascc_forces *forces,
+                              double *seconds)
+{
+    ascc_rung_choice *choice = &ladder->choice;
+    const int32_t rung = choice->doubter;
+    if (choice->doubted >= ladder->count || choice->doubts < choice->dwell)
+        return ASCC_OK;
+    const double begin = now(ladder);
+    const ascc_status status = ascc_step_look(ladder->rung[rung], p, forces);
+    *seconds = now(ladder) - begin;
+    if (status != ASCC_OK)
+        return ascc_fail(&ladder->message, status, "%s: %s", name_of(ladder, rung),
+                         ladder->rung[rung]->message.text);
+    note_distance(ladder, rung);
+    ascc_rung_choice_trust(choice);
+    doubt_if_strange(ladder, rung);
+    return ASCC_OK;
 }
 
 /* given: the rung, or negative: by the budget. */
@@ -248,6 +345,12 @@ static ascc_status run_once(ascc_ladder *ladder, ascc_particles *p, const ascc_f
     if (!ascc_grow(&ladder->context->allocator, (void **)&ladder->change, &ladder->change_capacity,
                    ladder->change_count + 1, sizeof *ladder->change))
         return ascc_ladder_fail(ladder, ASCC_ERROR_MEMORY, "no memory for one more choice");
+    double looked = 0.0;
+    ascc_status status = given < 0 ? look_again(ladder, p, forces, &looked) : ASCC_OK;
+    if (status != ASCC_OK) {
+        ladder->choice = before;
+        return status;
+    }
     if (given < 0) {
         ascc_rung_choice_make(&ladder->choice, ladder->budget, p->fluid_count);
     } else {
@@ -256,16 +359,18 @@ static ascc_status run_once(ascc_ladder *ladder, ascc_particles *p, const ascc_f
     }
     const int32_t rung = ladder->choice.rung;
     double seconds;
-    const ascc_status status =
-        run_rung(ladder, rung, p, forces, ladder->statistics.steps > 0, &seconds);
+    status = run_rung(ladder, rung, p, forces, ladder->statistics.steps > 0, &seconds);
     if (status != ASCC_OK) {
         ladder->choice = before;
         return status;
     }
     add_run(&ladder->statistics, &ladder->rung[rung]->statistics);
     tell(ladder, before.rung, before.reason);
-    note(ladder, rung, seconds);
+    note(ladder, rung, seconds + looked);
+    note_distance(ladder, rung);
     ascc_rung_choice_learn(&ladder->choice, seconds, p->fluid_count);
+    if (given < 0)
+        doubt_if_strange(ladder, rung);
     return ASCC_OK;
 }
 

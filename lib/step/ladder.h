@@ -19,7 +19,7 @@ struct ascc_ladder {
     ascc_step *rung[ASCC_MAX_RUNGS];
     double (*clock)(void *user); /* NULL = ascc_clock */
     void *user;
-    double budget;
+    double budget, max_distance; /* the latter: 0 = none */
     ascc_rung_choice choice;
     ascc_rung_change *change; /* [change_count], the first at step 0 */
     size_t change_count, change_capacity;

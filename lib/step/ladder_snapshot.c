@@ -7,12 +7,13 @@
 /*
  * Words of 64 bits, little endian:
  *
- *   magic version rungs rung stood recent_count late changes | recent[3] | cost[rungs] steps_on[rungs]
+ *   magic version rungs rung stood recent_count late changes doubted doubter doubts | recent[3] | cost[rungs] steps_on[rungs]
  *   | (step rung)[changes] | checksum
  */
 #define MAGIC UINT64_C(0x44414c4343534141) /* the bytes "AASCCLAD" */
-#define VERSION 1
-#define HEADER (8 + ASCC_RUNG_RECENT)
+#define VERSION 2
+#define RECENT 11 /* where `recent` begins */
+#define HEADER (RECENT + ASCC_RUNG_RECENT)
 
 static bool is_ladder(const ascc_ladder *ladder)
 {
@@ -61,6 +62,9 @@ ascc_status ascc_ladder_snapshot(const ascc_ladder *ladder, void *memory, size_t
     at = put(at, choice->recent_count);
     at = put(at, s->late);
     at = put(at, ladder->change_count);
+    at = put(at, (uint64_t)choice->doubted);
+    at = put(at, (uint64_t)choice->doubter);
+    at = put(at, choice->doubts);
     for (int i = 0; i < ASCC_RUNG_RECENT; i++)
         at = put(at, ascc_bits_of(choice->recent[i]));
     for (int32_t r = 0; r < ladder->count; r++)
@@ -78,8 +82,9 @@ ascc_status ascc_ladder_snapshot(const ascc_ladder *ladder, void *memory, size_t
 /* Whether a ladder of that many rungs can have come to this. */
 static bool is_possible(const unsigned char *bytes, size_t rungs, size_t changes)
 {
-    bool good = word(bytes, 3) < rungs;
-    for (size_t i = 8; i < HEADER + rungs; i++) {
+    bool good = word(bytes, 3) < rungs && word(bytes, 8) <= rungs && word(bytes, 8) > 0 &&
+                word(bytes, 9) < rungs;
+    for (size_t i = RECENT; i < HEADER + rungs; i++) {
         const double seconds = real(bytes, i);
         good = good && seconds >= 0.0 && isfinite(seconds);
     }
@@ -130,9 +135,12 @@ static void become(ascc_ladder *ladder, const unsigned char *bytes, size_t chang
     choice->stood = word(bytes, 4);
     choice->recent_count = word(bytes, 5);
     s->late = word(bytes, 6);
+    choice->doubted = (int32_t)word(bytes, 8);
+    choice->doubter = (int32_t)word(bytes, 9);
+    choice->doubts = word(bytes, 10);
     s->changes = changes ? changes - 1 : 0;
     for (size_t i = 0; i < ASCC_RUNG_RECENT; i++)
-        choice->recent[i] = real(bytes, 8 + i);
+        choice->recent[i] = real(bytes, RECENT + i);
     for (size_t r = 0; r < rungs; r++) {
         choice->cost[r] = real(bytes, HEADER + r);
         s->steps_on[r] = word(bytes, HEADER + rungs + r);

@@ -12,7 +12,8 @@
 
 void ascc_rung_choice_open(ascc_rung_choice *choice, int32_t count, uint64_t dwell)
 {
-    *choice = (ascc_rung_choice){.count = count, .rung = count - 1, .dwell = dwell, .stood = dwell};
+    *choice = (ascc_rung_choice){
+        .count = count, .rung = count - 1, .doubted = count, .dwell = dwell, .stood = dwell};
 }
 
 void ascc_rung_choice_know(ascc_rung_choice *choice, int32_t rung, double cost)
@@ -67,7 +68,7 @@ static int32_t highest(const ascc_rung_choice *choice, int32_t begin, int32_t en
 static int32_t cheapest(const ascc_rung_choice *choice)
 {
     int32_t best = 0;
-    for (int32_t r = 1; r < choice->count; r++)
+    for (int32_t r = 1; r < choice->doubted; r++)
         best = choice->cost[r] < choice->cost[best] ? r : best;
     return best;
 }
@@ -80,14 +81,32 @@ void ascc_rung_choice_take(ascc_rung_choice *choice, int32_t rung)
         choice->recent_count = 0;
     }
     choice->stood++;
+    choice->doubts += choice->doubted < choice->count;
+}
+
+void ascc_rung_choice_doubt(ascc_rung_choice *choice, int32_t rung, int32_t refuge)
+{
+    choice->doubter = rung;
+    choice->doubted = refuge + 1;
+    choice->doubts = 0;
+}
+
+void ascc_rung_choice_trust(ascc_rung_choice *choice)
+{
+    choice->doubted = choice->count;
 }
 
 int32_t ascc_rung_choice_make(ascc_rung_choice *choice, double budget, size_t particles)
 {
-    const int32_t rung = choice->rung, top = choice->count - 1;
+    const int32_t rung = choice->rung, top = choice->doubted - 1;
     const double now = choice->cost[rung] * (double)particles;
     int32_t wanted = rung;
     choice->reason = ASCC_LADDER_FITS;
+    if (rung > top) { /* at once: waiting would be worse than a change too many */
+        choice->reason = ASCC_LADDER_STRANGE;
+        ascc_rung_choice_take(choice, top);
+        return top;
+    }
     if (!(budget > 0.0)) {
         wanted = top;
     } else if (now > ASCC_RUNG_LEAVE * budget) {
@@ -95,7 +114,7 @@ int32_t ascc_rung_choice_make(ascc_rung_choice *choice, double budget, size_t pa
         wanted = wanted < 0 ? cheapest(choice) : wanted;
     } else {
         const int32_t above =
-            highest(choice, rung + 1, choice->count, ASCC_RUNG_TAKE * budget, particles);
+            highest(choice, rung + 1, top + 1, ASCC_RUNG_TAKE * budget, particles);
         wanted = above < 0 ? rung : above;
     }
     if (wanted != rung && choice->stood < choice->dwell) {
@@ -105,6 +124,8 @@ int32_t ascc_rung_choice_make(ascc_rung_choice *choice, double budget, size_t pa
         choice->reason = wanted < rung ? ASCC_LADDER_FELL : ASCC_LADDER_CLIMBED;
     } else if (budget > 0.0 && now > budget) {
         choice->reason = ASCC_LADDER_TOO_SLOW;
+    } else if (choice->doubted < choice->count) {
+        choice->reason = ASCC_LADDER_STRANGE;
     }
     ascc_rung_choice_take(choice, wanted);
     return wanted;

@@ -13,6 +13,9 @@
 
 typedef struct ascc_rung_choice {
     int32_t count, rung, reason; /* reason: of the last choice, an ascc_ladder_reason */
+    int32_t doubted;             /* the lowest rung that is not to be trusted; count = all are */
+    int32_t doubter;             /* the one that saw why */
+    uint64_t doubts;             /* steps since then */
     uint64_t dwell;              /* steps between two changes, at least */
     uint64_t stood; /* steps since the last change, or since the beginning: then as if long */
     double cost[ASCC_MAX_RUNGS]; /* s a fluid particle, smoothed; 0 = not known */
@@ -28,6 +31,12 @@ void ascc_rung_choice_know(ascc_rung_choice *choice, int32_t rung, double cost);
 
 /* Takes in the time of a step on the rung that stands. */
 void ascc_rung_choice_learn(ascc_rung_choice *choice, double seconds, size_t particles);
+
+/* This rung saw what it was not trained on: until ascc_rung_choice_trust the rungs from the one
+ * above `refuge` on are not taken. */
+void ascc_rung_choice_doubt(ascc_rung_choice *choice, int32_t rung, int32_t refuge);
+/* All rungs may be taken again. */
+void ascc_rung_choice_trust(ascc_rung_choice *choice);
 
 /* The rung of the next step. budget: s, 0 = none. */
 int32_t ascc_rung_choice_make(ascc_rung_choice *choice, double budget, size_t particles);

@@ -94,10 +94,12 @@ typedef struct ascc_step_state {
     size_t *expected;              /* of the network's neighbour lists */
     size_t *expected_pairs;        /* that the last relaxation kept */
     ascc_status (*engine)(struct ascc_step_state *state); /* engine.h */
-    ascc_wall_volumes *walls;                             /* kept while they rest */
+    const struct ascc_trust *trust; /* what the step's input is measured by; NULL = it is not */
+    ascc_wall_volumes *walls;       /* kept while they rest */
     ascc_search_tools tools;
     ascc_step_statistics *statistics; /* also the times of stages */
     double since;                     /* when the stage under way began, s */
+    bool looks;                       /* only: the step ends with what the network sees */
     /* What stages make: */
     ascc_sleep sleep;
     ascc_advance advance;
@@ -164,6 +166,9 @@ ascc_status ascc_stage_relaxation(ascc_step_state *state);
 ascc_status ascc_stage_divergence(ascc_step_state *state);
 /* Walls that nothing passes. errors: RANGE. */
 ascc_status ascc_stage_contact(ascc_step_state *state);
+
+/* After the network: how far its input is from training's, into the statistics. */
+void ascc_measure_trust(ascc_step_state *state);
 
 /* Monotonic seconds. */
 double ascc_clock(void);

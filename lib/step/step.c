@@ -14,7 +14,7 @@
 #define DEFAULT_MAX_NEIGHBORS 4096
 #define DEFAULT_DISPLACEMENT 64.0 /* spacings a step */
 
-_Static_assert(sizeof(void *) != 8 || sizeof(ascc_step_options) == 48, "released layout");
+_Static_assert(sizeof(void *) != 8 || sizeof(ascc_step_options) == 56, "released layout");
 _Static_assert(sizeof(void *) != 8 || sizeof(ascc_forces) == 24, "released layout");
 _Static_assert(sizeof(void *) != 8 || sizeof(ascc_stage_time) == 16, "released layout");
 
@@ -29,13 +29,14 @@ static ascc_status read_options(const ascc_step_options *given, ascc_step_option
     if (!(o->time_step >= 0.0 && isfinite(o->time_step)) ||
         !(o->length_unit >= 0.0 && isfinite(o->length_unit)) || !(o->max_displacement >= 0.0) ||
         !(o->sleep_speed >= 0.0 && isfinite(o->sleep_speed)) || o->max_neighbors < 0 ||
-        o->max_neighbors > 1 << 20 || o->substeps < -1)
+        o->max_neighbors > 1 << 20 || o->substeps < -1 || o->measure_distance < 0 ||
+        o->measure_distance > 1)
         return ascc_fail(message, ASCC_ERROR_ARGUMENT,
                          "step options: time_step %g, length_unit %g, max_displacement %g, "
                          "max_neighbors %d, sleep_speed %g: each must be finite and >= 0; substeps "
-                         "%d: at least -1",
+                         "%d: at least -1; measure_distance %d: 0 or 1",
                          o->time_step, o->length_unit, o->max_displacement, o->max_neighbors,
-                         o->sleep_speed, o->substeps);
+                         o->sleep_speed, o->substeps, o->measure_distance);
     return ASCC_OK;
 }
 
@@ -50,12 +51,15 @@ static ascc_status fill_step(ascc_step *step, const ascc_step_options *o, ascc_m
     step->model_time = 1.0;
     step->max_displacement = o->max_displacement;
     step->sleep_speed = o->sleep_speed;
+    step->measures = o->measure_distance && model->trust.layer >= 0;
     step->engine = ascc_engine_cpu;
     const ascc_status status =
         ascc_network_create(&step->network, &context->allocator, &model->plan, &model->packed,
                             o->max_neighbors ? o->max_neighbors : DEFAULT_MAX_NEIGHBORS, message);
     if (status != ASCC_OK)
         return status;
+    if (step->measures)
+        ascc_network_look_at(&step->network, model->trust.layer);
     const size_t keys = (size_t)step->network.key_count;
     step->expected = ascc_allocate(&context->allocator, keys, sizeof *step->expected);
     if (!step->expected) {
@@ -198,6 +202,13 @@ static const struct {
     {NULL, ascc_stage_support, false},
 };
 
+/* Nothing has been seen yet. */
+static void forget_distance(ascc_step_statistics *s)
+{
+    s->distance_mean = s->distance_worst = 0.0;
+    s->distance_row = s->distance_count = 0;
+}
+
 static bool all_sleeps(const ascc_step_state *state)
 {
     return state->sleep.count > 0 && state->sleep.count == state->particles->fluid_count;
@@ -222,6 +233,8 @@ static ascc_status run_stages(ascc_step_state *state)
         status = stages[i].run(state);
         if (stages[i].name)
             ascc_stage_lap(state, stages[i].name);
+        if (state->looks && stages[i].run == run_engine)
+            break;
     }
     return status;
 }
@@ -259,7 +272,7 @@ static ascc_status run_turned(const ascc_step *step, ascc_particles *p, ascc_ste
     if (acceleration)
         ascc_turn_reals(turn, true, acceleration, p->fluid_count, d);
     ascc_turn_particles(turn, true, p);
-    if (status == ASCC_OK)
+    if (status == ASCC_OK && !state->looks)
         turn_back(state);
     return status;
 }
@@ -279,15 +292,18 @@ ascc_status ascc_step_once(ascc_step *step, ascc_particles *p, const ascc_motion
         .expected = step->expected,
         .expected_pairs = &step->expected_pairs,
         .engine = step->engine,
+        .trust = step->measures ? &step->model->trust : NULL,
+        .looks = step->looks,
         .walls = &step->walls,
         .tools = {arena, step->context->workers, &step->context->kernels, &step->message},
         .statistics = &step->statistics,
         .since = ascc_clock()};
     const double begin = state->since;
     ascc_status status = remember(step, p);
+    forget_distance(state->statistics);
     if (status == ASCC_OK)
         status = ascc_turns(&state->turn) ? run_turned(step, p, state) : run_stages(state);
-    if (status == ASCC_OK)
+    if (status == ASCC_OK && !state->looks)
         status = ascc_stage_commit(state, p, first);
     else if (step->halo)
         status = step->halo->agree(step->halo, status);
@@ -463,6 +479,7 @@ static ascc_status run_once(ascc_step *step, ascc_particles *p, ascc_motion *mot
     const bool first = step->statistics.steps == 0 && !step->continues;
     const ascc_step_statistics before = step->statistics;
     step->statistics.substeps = count;
+    count = step->looks ? 1 : count;
     for (int32_t n = 0; n < count && status == ASCC_OK; n++, step->statistics.substeps_total++) {
         status = step->halo
                      ? run_with_ghosts(step, p, motion, first && n == 0, &state)
@@ -509,6 +526,21 @@ ascc_status ascc_step_run(ascc_step *step, ascc_particles *particles, const ascc
     }
     if (status != ASCC_OK)
         ascc_context_log(step->context, step->message.text);
+    return status;
+}
+
+ascc_status ascc_step_look(ascc_step *step, ascc_particles *particles, const ascc_forces *forces)
+{
+    const ascc_step_statistics before = step->statistics;
+    step->looks = true;
+    const ascc_status status = ascc_step_run(step, particles, forces, 1);
+    const ascc_step_statistics seen = step->statistics;
+    step->looks = false;
+    step->statistics = before;
+    step->statistics.distance_mean = seen.distance_mean;
+    step->statistics.distance_worst = seen.distance_worst;
+    step->statistics.distance_row = seen.distance_row;
+    step->statistics.distance_count = seen.distance_count;
     return status;
 }
 

@@ -27,6 +27,8 @@ struct ascc_step {
     size_t kept_capacity;
     ascc_turn turn;  /* of the run under way; none for a trainer's steps */
     ascc_halo *halo; /* of the run under way: fluid of other processes; NULL = there is none */
+    bool measures;   /* how far its input is from training's */
+    bool looks;      /* the next run sees and moves nothing */
     bool continues;  /* the next run adds to impulses of walls that another step's began */
     ascc_step_statistics statistics;
     ascc_message message;
@@ -36,5 +38,9 @@ struct ascc_step {
  * particles stay as they were. first: of a run, whose sums begin with it. */
 ascc_status ascc_step_once(ascc_step *step, ascc_particles *p, const ascc_motion *motion,
                            bool first, ascc_arena *arena, ascc_step_state *state);
+
+/* Sees the set as the next step would, and moves nothing: the statistics' distances are of it, all else in them
+ * stays. errors: as ascc_step_run. */
+ascc_status ascc_step_look(ascc_step *step, ascc_particles *particles, const ascc_forces *forces);
 
 #endif

@@ -454,8 +454,20 @@ static ascc_status open_rollout(rollout *r, ascc_rollout_worker *worker,
     return take_memory(r) ? open_particles(r) : ASCC_ERROR_MEMORY;
 }
 
-ascc_status ascc_rollout_look(ascc_rollout_worker *worker, const ascc_rollout_task *task,
-                              ascc_engine engine)
+/* An engine that computes the network and moves nothing by it. */
+static ascc_status look(ascc_step_state *state)
+{
+    ascc_status status = ascc_stage_sight(state);
+    if (status == ASCC_OK)
+        status = ascc_network_demand(&state->run, state->network, &state->hierarchy, &state->tools,
+                                     state->expected);
+    if (status == ASCC_OK)
+        status = ascc_network_forward(&state->run, state->fluid_features, state->boundary_features);
+    ascc_arena_return(state->tools.arena, state->before_features);
+    return status;
+}
+
+ascc_status ascc_rollout_look(ascc_rollout_worker *worker, const ascc_rollout_task *task)
 {
     rollout r;
     ascc_random random = task->random;
@@ -463,7 +475,7 @@ ascc_status ascc_rollout_look(ascc_rollout_worker *worker, const ascc_rollout_ta
     ascc_status status = open_rollout(&r, worker, task);
     if (status == ASCC_OK) {
         start_at(&r, task->frame, &random);
-        worker->step->engine = engine;
+        worker->step->engine = look;
         status = step_into(&r, task->frame, 0);
         worker->step->engine = own;
     }

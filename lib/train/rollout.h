@@ -53,10 +53,9 @@ void ascc_rollout_worker_close(ascc_rollout_worker *worker);
 ascc_rollout_result ascc_rollout_run(ascc_rollout_worker *worker, const ascc_transposed *transposed,
                                      const ascc_rollout_task *task, float *packed, float *gradient);
 
-/* One step from the true state that the task begins with, by this engine: what it saw is in worker->state[0]
- * until the worker is used again. errors: as of a step. */
-ascc_status ascc_rollout_look(ascc_rollout_worker *worker, const ascc_rollout_task *task,
-                              ascc_engine engine);
+/* One step from the true state that the task begins with, whose network moves nothing: what it saw is in
+ * worker->state[0] until the worker is used again. errors: as of a step. */
+ascc_status ascc_rollout_look(ascc_rollout_worker *worker, const ascc_rollout_task *task);
 
 /* Mean distance of velocities times the time step, way [fluid][dimension], from the way between two true
  * states, in spacings; gradient (NULL = not wanted), by way, times `share`. */

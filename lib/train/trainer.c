@@ -285,6 +285,7 @@ void ascc_trainer_destroy(ascc_trainer **trainer)
     give(t, t->weights, 4 * t->parameter_count, sizeof *t->weights);
     give(t, t->before, 4 * t->parameter_count, sizeof *t->before);
     give(t, t->tensor, t->tensor_count, sizeof *t->tensor);
+    give(t, t->text, t->text_capacity, 1);
     if (t->file.tensor)
         ascc_safetensors_close(&t->file);
     if (t->averaged_file.tensor)
@@ -495,8 +496,8 @@ static int32_t warm_up_of(const ascc_kept_sequence *s, const ascc_training_stage
     return s->warm_up > 0 && s->warm_up < stage->warm_up ? s->warm_up : stage->warm_up;
 }
 
-static ascc_status draw_task(ascc_trainer *t, const ascc_training_stage *stage, ascc_random random,
-                             ascc_rollout_task *task)
+ascc_status ascc_trainer_draw(ascc_trainer *t, const ascc_training_stage *stage, ascc_random random,
+                              ascc_rollout_task *task)
 {
     const double share = t->options.truth_share, drawn = ascc_random_uniform(&random);
     double sum = 0.0, edge = t->model->plan.spacing;
@@ -543,7 +544,8 @@ static ascc_status measure_whitening(ascc_trainer *t)
     ascc_rollout_task task[ASCC_WHITENING_FRAMES];
     ascc_status status = ASCC_OK;
     for (size_t i = 0; i < ASCC_WHITENING_FRAMES && status == ASCC_OK; i++)
-        status = draw_task(t, &stage, ascc_random_open(t->options.seed, UINT64_MAX, i), &task[i]);
+        status = ascc_trainer_draw(t, &stage, ascc_random_open(t->options.seed, UINT64_MAX, i),
+                                   &task[i]);
     if (status == ASCC_OK)
         status = ascc_whitening_measure(&t->whitening, &t->worker[0], task, ASCC_WHITENING_FRAMES);
     if (status == ASCC_ERROR_MEMORY)
@@ -704,8 +706,8 @@ ascc_status ascc_trainer_iterate(ascc_trainer *t, ascc_training_report *report)
     own.warm_up = stage->warm_up;
     ascc_status status = ASCC_OK;
     for (int32_t b = 0; b < t->batch && status == ASCC_OK; b++)
-        status = draw_task(t, stage, ascc_random_open(t->options.seed, t->iteration, (uint64_t)b),
-                           &t->task[b]);
+        status = ascc_trainer_draw(
+            t, stage, ascc_random_open(t->options.seed, t->iteration, (uint64_t)b), &t->task[b]);
     if (status == ASCC_OK && t->whitening.term_count && !t->whitening.ready)
         status = measure_whitening(t);
     if (status != ASCC_OK)

@@ -47,6 +47,8 @@ struct ascc_trainer {
     int32_t failed_iterations;   /* iterations of late without any rollout */
     int32_t zero_gradient_count; /* iterations of late without any gradient */
     bool changed;                /* there is a before */
+    char *text;                  /* of statistics, for the caller */
+    size_t text_capacity;
     ascc_message message;
 };
 
@@ -58,6 +60,10 @@ static inline bool ascc_trainer_alive(const ascc_trainer *t)
 /* Keeps the line of a call that fails as the trainer's message and logs it; returns the status. */
 ascc_status ascc_trainer_fail(ascc_trainer *t, ascc_status status, const char *format, ...)
     ASCC_PRINTF(3, 4);
+
+/* A rollout of this stage, drawn. errors: ARGUMENT (no sequence is long enough). */
+ascc_status ascc_trainer_draw(ascc_trainer *t, const ascc_training_stage *stage, ascc_random random,
+                              ascc_rollout_task *task);
 
 /* The model takes over t->weights. */
 void ascc_trainer_apply(ascc_trainer *t);

@@ -209,23 +209,10 @@ static ascc_status add_term(const ascc_whitened_term *term, const ascc_network_r
     return ASCC_OK;
 }
 
-/* An engine that computes the network and moves nothing by it. */
-static ascc_status look(ascc_step_state *state)
-{
-    ascc_status status = ascc_stage_sight(state);
-    if (status == ASCC_OK)
-        status = ascc_network_demand(&state->run, state->network, &state->hierarchy, &state->tools,
-                                     state->expected);
-    if (status == ASCC_OK)
-        status = ascc_network_forward(&state->run, state->fluid_features, state->boundary_features);
-    ascc_arena_return(state->tools.arena, state->before_features);
-    return status;
-}
-
 static ascc_status add_frame(const ascc_whitening *w, ascc_rollout_worker *worker,
                              const ascc_rollout_task *task, column_sums *sums)
 {
-    ascc_status status = ascc_rollout_look(worker, task, look);
+    ascc_status status = ascc_rollout_look(worker, task);
     if (status != ASCC_OK)
         return status == ASCC_ERROR_MEMORY ? status : ASCC_OK;
     for (size_t i = 0; i < w->term_count && status == ASCC_OK; i++) {

@@ -28,6 +28,10 @@ class LadderStatistics:
     external_impulse: Quanta
     wall_impulse: Quanta
     support_impulse: Quanta
+    distance_mean: float
+    distance_worst: float
+    distance_row: int
+    distance_count: int
 
 
 class Ladder(_Handle):
@@ -38,6 +42,7 @@ class Ladder(_Handle):
     dwell      s of simulated time between two changes, at least
     time_step  s; 0 = the models'
     length_unit  metres in one unit of length, as the particles'
+    max_distance  mean distance from training beyond which the rung without a network runs; 0 = any
     context    whose threads are used; None = the last model's
     """
 
@@ -51,13 +56,16 @@ class Ladder(_Handle):
         dwell: float = 1.0,
         time_step: float = 0.0,
         length_unit: float = 1.0,
+        max_distance: float = 0.0,
         context: Optional[Context] = None,
     ) -> None:
         if not models:
             raise ValueError("models: none")
         self.context = context or models[-1].context
         step = _library.StepOptions(time_step=time_step, length_unit=length_unit)
-        options = _library.LadderOptions(budget=budget, dwell=dwell, step=ctypes.pointer(step))
+        options = _library.LadderOptions(
+            budget=budget, dwell=dwell, step=ctypes.pointer(step), max_distance=max_distance
+        )
         raw = (ctypes.c_void_p * len(models))(*[model._handle.value for model in models])
         handle = ctypes.c_void_p()
         self.context._check(

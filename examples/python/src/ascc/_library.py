@@ -35,6 +35,7 @@ class LadderReason(IntEnum):
     WAITS = 3
     TOO_SLOW = 4
     GIVEN = 5
+    STRANGE = 6
 
 
 class Kind(IntEnum):
@@ -110,6 +111,9 @@ class ModelInfo(Sized):
         ("gravity_min", c_double),
         ("gravity_max", c_double),
         ("way_max", c_double),
+        ("tells_distance", c_int32),
+        ("reserved2", c_int32),
+        ("distance_threshold", c_double),
     ]
 
 
@@ -237,6 +241,8 @@ class StepOptions(Sized):
         ("max_neighbors", c_int32),
         ("substeps", c_int32),
         ("sleep_speed", c_double),
+        ("measure_distance", c_int32),
+        ("reserved", c_int32),
     ]
 
 
@@ -280,6 +286,10 @@ class StepStatistics(Sized):
         ("substeps_total", c_uint64),
         ("asleep", c_uint64),
         ("support_impulse", ctypes.c_int64 * 3),
+        ("distance_mean", c_double),
+        ("distance_worst", c_double),
+        ("distance_row", c_uint64),
+        ("distance_count", c_uint64),
     ]
 
 
@@ -295,6 +305,7 @@ class LadderOptions(Sized):
         ("clock", CLOCK),
         ("user", c_void_p),
         ("step", ctypes.POINTER(StepOptions)),
+        ("max_distance", c_double),
     ]
 
 
@@ -316,6 +327,10 @@ class LadderStatistics(Sized):
         ("external_impulse", ctypes.c_int64 * 3),
         ("wall_impulse", ctypes.c_int64 * 3),
         ("support_impulse", ctypes.c_int64 * 3),
+        ("distance_mean", c_double),
+        ("distance_worst", c_double),
+        ("distance_row", c_uint64),
+        ("distance_count", c_uint64),
     ]
 
 

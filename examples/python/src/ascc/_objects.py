@@ -198,6 +198,8 @@ class ModelInfo:
     gravity_min: float
     gravity_max: float
     way_max: float
+    tells_distance: bool
+    distance_threshold: float
     gravity: Tuple[float, ...]
     particle_spacing: float
     rest_density: float
@@ -261,7 +263,12 @@ class Model(_Handle):
         }
         for name in ("name", "description"):
             values[name] = values[name].decode("utf-8", "replace")
-        for name in ("conserves_momentum", "conserves_angular_momentum", "advected"):
+        for name in (
+            "conserves_momentum",
+            "conserves_angular_momentum",
+            "advected",
+            "tells_distance",
+        ):
             values[name] = bool(values[name])
         values["gravity"] = tuple(raw.gravity[: raw.dimension])
         return ModelInfo(**values)
@@ -774,6 +781,10 @@ class Statistics:
     substeps_total: int
     asleep: int
     support_impulse: Quanta
+    distance_mean: float  # from training's states, with measure_distance (docs/trust.md)
+    distance_worst: float
+    distance_row: int
+    distance_count: int
 
 
 class Step(_Handle):
@@ -785,6 +796,7 @@ class Step(_Handle):
     max_neighbors     of one point; 0 = 4096
     substeps          a time step is cut into: 0 = what the model's range asks for, n = at most n, -1 = none
     sleep_speed       fluid slower than this, in what gravity gives in a step, stops; 0 = none
+    measure_distance  the statistics tell how far what is seen is from training's
     context           whose threads are used; None = the model's
     """
 
@@ -800,6 +812,7 @@ class Step(_Handle):
         max_neighbors: int = 0,
         substeps: int = 0,
         sleep_speed: float = 0.0,
+        measure_distance: bool = False,
         context: Optional[Context] = None,
     ) -> None:
         self.context = context or model.context
@@ -810,6 +823,7 @@ class Step(_Handle):
             max_neighbors=_int32("max_neighbors", max_neighbors),
             substeps=_int32("substeps", substeps),
             sleep_speed=sleep_speed,
+            measure_distance=int(measure_distance),
         )
         handle = ctypes.c_void_p()
         self.context._check(
