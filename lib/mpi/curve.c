@@ -62,15 +62,11 @@ static void add_owner(ascc_owners *owners, int rank)
     owners->is[rank] = 1;
 }
 
-void ascc_owners_find(ascc_owners *owners, const ascc_curve *curve, const double *place,
-                      double reach)
+/* Of all blocks that touch a box. */
+static void find_in_box(ascc_owners *owners, const ascc_curve *curve, const double from[3],
+                        const double to[3])
 {
     int64_t low[3], high[3], at[3];
-    double from[3] = {0.0, 0.0, 0.0}, to[3] = {0.0, 0.0, 0.0};
-    for (int32_t c = 0; c < curve->dimension; c++) {
-        from[c] = place[c] - reach;
-        to[c] = place[c] + reach;
-    }
     ascc_curve_block(curve, from, low);
     ascc_curve_block(curve, to, high);
     if (owners->known && memcmp(low, owners->low, sizeof low) == 0 &&
@@ -85,6 +81,41 @@ void ascc_owners_find(ascc_owners *owners, const ascc_curve *curve, const double
         for (at[1] = low[1]; at[1] <= high[1]; at[1]++)
             for (at[0] = low[0]; at[0] <= high[0]; at[0]++)
                 add_owner(owners, ascc_curve_owner(curve, at));
+}
+
+/* Whether one process owns all within reach of a block, as of most of them. */
+static bool is_inner(ascc_owners *owners, const ascc_curve *curve, const double *place,
+                     double reach)
+{
+    double from[3] = {0.0, 0.0, 0.0}, to[3] = {0.0, 0.0, 0.0};
+    int64_t block[3];
+    ascc_curve_block(curve, place, block);
+    if (!owners->known || owners->reach != reach ||
+        memcmp(block, owners->block, sizeof block) != 0) {
+        for (int32_t c = 0; c < curve->dimension; c++) {
+            from[c] = (double)block[c] * curve->edge - reach;
+            to[c] = (double)(block[c] + 1) * curve->edge + reach;
+        }
+        owners->known = false;
+        find_in_box(owners, curve, from, to);
+        memcpy(owners->block, block, sizeof block);
+        owners->reach = reach;
+        owners->inner = owners->count == 1;
+    }
+    return owners->inner;
+}
+
+void ascc_owners_find(ascc_owners *owners, const ascc_curve *curve, const double *place,
+                      double reach)
+{
+    double from[3] = {0.0, 0.0, 0.0}, to[3] = {0.0, 0.0, 0.0};
+    if (is_inner(owners, curve, place, reach))
+        return;
+    for (int32_t c = 0; c < curve->dimension; c++) {
+        from[c] = place[c] - reach;
+        to[c] = place[c] + reach;
+    }
+    find_in_box(owners, curve, from, to);
 }
 
 static int by_key(const void *a, const void *b)

@@ -27,6 +27,9 @@ int ascc_curve_owner_of(const ascc_curve *curve, const double *place);
 /* The processes that own a block within `reach` of a place on every axis, each once, ascending in order of finding. */
 typedef struct ascc_owners {
     int64_t low[3], high[3]; /* blocks; those of the last place */
+    int64_t block[3];        /* that it was in */
+    double reach;            /* that was asked for */
+    bool inner;              /* one process owns all within reach of that block */
     bool known;
     int count, *rank; /* [size] */
     uint8_t *is;      /* [size] */

@@ -168,10 +168,15 @@ ascc_status ascc_mpi_settle(ascc_mpi_particles *set)
         return status;
     bool room = ascc_mpi_room(set, &set->flags, rows + 1, 1);
     uint8_t *leaves = set->flags.at;
+    int owner = 0;
+    int64_t block[3], last[3] = {INT64_MAX, 0, 0};
     for (size_t i = 0; room && i < rows; i++) {
         double place[3];
         find_place(set, i, place);
-        const int owner = ascc_curve_owner_of(&set->curve, place);
+        ascc_curve_block(&set->curve, place, block);
+        if (memcmp(block, last, sizeof last) != 0) /* rows follow one another mostly in one */
+            owner = ascc_curve_owner(&set->curve, block);
+        memcpy(last, block, sizeof last);
         leaves[i] = owner != set->rank;
         if (leaves[i])
             room = add_pair(set, &count, owner, i);
