@@ -1,11 +1,14 @@
 # SPDX-License-Identifier: MIT
 """Tests of bench/tables without its measurements; run by tests/bench_test.sh."""
 
+import json
 import os
 import sys
 import tempfile
-import types
+import threading
 import unittest
+
+import numpy as np
 
 HERE = os.path.dirname(os.path.abspath(__file__))
 sys.path[:0] = [os.path.join(HERE, "support"), os.path.join(HERE, "..", "bench", "tables")]
@@ -13,42 +16,52 @@ sys.path[:0] = [os.path.join(HERE, "support"), os.path.join(HERE, "..", "bench",
 import ablation  # noqa: E402
 import draw  # noqa: E402
 import page  # noqa: E402
+import tables  # noqa: E402
 import tap  # noqa: E402
-from cache import Cache, File  # noqa: E402
+import training  # noqa: E402
+from cache import Cache, Failed, File  # noqa: E402
+
+try:
+    import lagrangebench_gns
+except ImportError:
+    lagrangebench_gns = None
 
 PAPER = {
     "table1": {"GNS": {"rmse": 1e-3, "emd": 2, "jsd": 0.1}},
     "table2": {"no ASCC": 0.42, "full": 1.0},
     "speed": {"50000": 67.25, "1000000": 1200, "ratio": 162},
+    "published": {"GNS": "20 million iterations"},
 }
 
 
 def figures(rmse):
-    return {"rmse_20": rmse, "emd_final": rmse, "frames": 4, "last_frame": 3, "jsd_mean": 0.1, "escaped_max": 3}
+    return {"rmse_20": rmse, "emd_final": rmse, "frames": 4, "last_frame": 3, "jsd_mean": 0.1, "escaped_max": 3, "fluid": 10}
 
 
-def ablation_row(name, rmse, momentum):
-    return {"row": name, "text": "", "seconds": 1, "figures": [figures(rmse)], "momentum": (momentum, None, "")}
+def ablation_run(rmse, momentum):
+    return {"seconds": 1, "figures": [figures(rmse)], "whole": [figures(rmse)], "momentum": (momentum, None, "")}
 
 
 class Page(unittest.TestCase):
-    def test_a_method_without_a_file_is_said_to_be_missing(self):
-        size = types.SimpleNamespace(quick=True, frames=1, steps=2, fall=20, sequences=1, iterations=3, particles=10, more=20)
-        row = {"row": "GNS", "model": "gns2d", "path": None, "figures": [], "momentum": None}
+    def test_a_method_without_a_network_is_said_to_be_missing(self):
+        row = {"row": "GNS", "model": "gns2d", "dimension": "2", "runs": []}
+        free = {"2": [{"err_n1_difference": 5e-4}], "3": []}
         with tempfile.TemporaryDirectory() as folder:
             path = os.path.join(folder, "tables.md")
-            page.write(path, size, PAPER, [row], 1, [], [], None, ["a run: broke"])
+            page.write(path, tables.Size(True), PAPER, [row], free, [], [], None, ["a run: broke"])
             with open(path, encoding="utf-8") as file:
                 text = file.read()
-        self.assertIn("| GNS | `gns2d` | no model file |", text)
-        self.assertIn("- no model file: `gns2d`", text)
+        self.assertIn("| GNS | `gns2d` | none |", text)
+        self.assertIn("- no network: `gns2d`", text)
         self.assertIn("- a run: broke", text)
         self.assertIn("quick run", text)
+        self.assertIn("free flight has 0.5 mm", text)
 
-    def test_zero_is_said_only_where_it_is(self):
-        self.assertEqual(page.last(([0.0, 0.0], None, "")), "**0**")
-        self.assertEqual(page.last(([0.0, 3e-18], None, "")), "3e-18")
-        self.assertEqual(page.last(None), "-")
+    def test_what_was_trained_stands_beside_what_is_published(self):
+        runs = [{"iterations": 10, "weights": 161000, "jitter": 0.003}]
+        row = {"row": "GNS, small", "model": "gns2d-small", "rate": 0.001, "noise": 3, "runs": runs}
+        line = list(page.networks([row, {"row": "ASCC, shipped", "model": "x", "runs": runs}], PAPER))[-1]
+        self.assertIn("| 161,000 | 0.001 | 0.003 | 10 | 20 million iterations |", line)
 
     def test_spread_is_the_standard_deviation_of_several(self):
         self.assertEqual(page.spread([1.0, 3.0]), "2 ± 1.4")
@@ -56,11 +69,20 @@ class Page(unittest.TestCase):
         self.assertEqual(page.spread([None]), "-")
 
     def test_the_full_network_scores_1_and_lost_momentum_or_doubled_errors_less(self):
-        full = ablation_row("full", 1.0, [0.0])
-        self.assertEqual(page.score(full, full), 1)
-        self.assertAlmostEqual(page.score(ablation_row("no ASCC", 1.0, [0.5, 1.0]), full), 3 / (1 + 1 + 2))
-        self.assertAlmostEqual(page.score(ablation_row("no ASCC", 2.0, [0.0]), full), 3 / (2 + 2 + 1))
-        self.assertIsNone(page.score(ablation_row("stopped", None, [0.0]), full))
+        full = {"row": "full", "runs": [ablation_run(1.0, [0.0]), ablation_run(1.0, [0.0])]}
+        of = lambda *run: page.scores({"runs": [ablation_run(*run)]}, [full])  # noqa: E731
+        self.assertEqual(page.scores(full, [full]), [1, 1])
+        self.assertAlmostEqual(of(1.0, [0.5, 1.0])[0], 3 / (1 + 1 + 2))
+        self.assertAlmostEqual(of(2.0, [0.0])[0], 3 / (2 + 2 + 1))
+        self.assertEqual(of(None, [0.0]), [])
+        full["runs"][1] = ablation_run(3.0, [0.0])  # errors are held against the mean of the full ones
+        self.assertAlmostEqual(of(2.0, [0.0])[0], 1)
+
+    def test_zero_is_said_only_where_it_is(self):
+        of = lambda *errors: page.momentum_of({"runs": [{"momentum": (list(errors), None, "")}]})  # noqa: E731
+        self.assertEqual(of(0.0, 0.0), "**0**")
+        self.assertEqual(of(0.0, 3e-18), "3e-18")
+        self.assertEqual(page.momentum_of({"runs": [{"momentum": None}]}), "-")
 
     def test_orders_are_told_where_they_part(self):
         said = {"a": 1, "b": 2, "c": 3}
@@ -69,7 +91,26 @@ class Page(unittest.TestCase):
 
     def test_a_rollout_that_ended_early_is_told(self):
         self.assertEqual(page.stopped([figures(1.0)]), "")
-        self.assertEqual(page.stopped([{"frames": 40, "last_frame": 35}]), " (stopped at frame 35)")
+        ended = [{"frames": 40, "last_frame": last} for last in (39, 35, 17)]
+        self.assertEqual(page.stopped(ended), " (2 of 3 stopped, the first at frame 17)")
+
+    def test_spread_of_a_method_is_that_of_its_networks(self):
+        run = lambda seconds, *errors: {  # noqa: E731
+            "seconds": seconds, "momentum": ([0.0, seconds / 10], None, ""), "figures": [figures(e) for e in errors]}  # fmt: skip
+        row = {"row": "GNS", "model": "gns2d", "runs": [run(10, 1.0, 3.0), run(30, 4.0, 4.0)]}
+        line = list(page.table1([row], PAPER))[-1]
+        self.assertIn("| 2 x 20 |", line)
+        self.assertIn("| 3,000 ± 1,414 |", line)
+        self.assertIn("| 30 % | 2 ± 1.4 |", line)
+        row["runs"] = [dict(run(0, 1.0, 3.0), seconds=None, momentum=([0.0], None, ""))]
+        line = list(page.table1([row], PAPER))[-1]
+        self.assertIn("| [card](models/gns2d.md) |", line)
+        self.assertIn("| 2,000 ± 1,414 |", line)
+        self.assertIn("| **0** |", line)
+
+    def test_only_rows_that_the_paper_has_too_are_put_in_order(self):
+        rows = [{"row": name, "runs": [{"figures": [figures(e)]}]} for name, e in (("GNS", 2.0), ("GNS, shipped", 1.0))]
+        self.assertEqual(page.table1_order(rows, PAPER), "GNS; as in the paper")
 
 
 class Figure(unittest.TestCase):
@@ -112,12 +153,82 @@ class Kept(unittest.TestCase):
             self.assertEqual(Cache(folder).result("x", [1], lambda path: 5), 5)
 
 
-class Ablation(unittest.TestCase):
-    def test_every_row_trains_equally_long(self):
+    def test_what_runs_beside_measures_once(self):
+        with tempfile.TemporaryDirectory() as folder:
+            inner, seen = [], []
+
+            def measure(path):
+                # Another one asks for it meanwhile, and waits.
+                inner.append(threading.Thread(target=lambda: seen.append(Cache(folder).result("x", [1], lambda path: 7))))
+                inner[0].start()
+                return 5
+
+            seen.append(Cache(folder).result("x", [1], measure))
+            inner[0].join()
+            self.assertEqual(seen, [5, 5])
+
+    def test_nothing_is_begun_when_the_time_is_over(self):
+        with tempfile.TemporaryDirectory() as folder:
+            late = Cache(folder, 0)
+            with self.assertRaises(Failed):
+                late.result("x", [1], lambda path: 5)
+            self.assertTrue(late.left)
+            Cache(folder).result("x", [1], lambda path: 5)
+            self.assertEqual(late.result("x", [1], lambda path: 6), 5)
+
+
+class Training(unittest.TestCase):
+    def test_every_row_of_table_2_trains_equally_long(self):
         for percent in (100, 5):
-            configs = [ablation.config_of(network, schedule, percent) for _, network, schedule, _ in ablation.ROWS]
+            configs = [ablation.config_of(network, schedule, [], 1, percent) for _, network, schedule, _ in ablation.ROWS]
             self.assertEqual(len({sum(s["iterations"] for s in c["stages"]) for c in configs}), 1)
             self.assertEqual([c["network"].get("output") for c in configs], ["plain"] + [None] * 5)
+
+    def test_every_method_has_a_config_and_the_same_schedule(self):
+        rows = [row for row in tables.methods() if row["trained"]]
+        self.assertGreater(len(rows), 5)
+        for row in rows:
+            config = training.setup(row["model"], ["x"], 3, 0.004, 0)
+            self.assertEqual([s["learning_rate"] for s in config["stages"]], [0.004, 0.004 / 3])
+            self.assertEqual((config["seed"], config["jitter"], config["data"]), (3, 0, {"train": ["x"]}))
+            self.assertNotIn("model", config)
+
+    def test_rates_are_tried_first_then_noises_at_the_best(self):
+        tried, train = [], training.train
+        training.train = lambda tools, config, seconds, each: {
+            "path": (config["stages"][0]["learning_rate"], config["jitter"] / base)}  # fmt: skip
+        base = training.read("gns2d")["jitter"]
+        try:
+            judge = lambda path: tried.append(path) or abs(path[0] - 0.006) + abs(path[1] - 3)  # noqa: E731
+            chosen = training.tune(None, "gns2d", [], 1, None, (3, 2), judge)
+        finally:
+            training.train = train
+        self.assertEqual(chosen, (0.006, 3))
+        self.assertEqual(len(tried), 5)
+        self.assertEqual({rate for rate, _ in tried[3:]}, {0.006})
+
+
+class Pieces(unittest.TestCase):
+    @unittest.skipIf(lagrangebench_gns is None, "h5py is not installed")
+    def test_frames_in_which_nearest_images_agree_are_continuous_in_a_wide_box(self):
+        import h5py
+
+        way = np.linspace(0, 4, 60)  # through the side of a box of 5, then apart
+        x = np.zeros((60, 3, 3)) + [[0, 0, 0], [1, 0, 0], [0, 1, 0]] + 3.5
+        x[..., 0] += way[:, None]
+        x[40:, 2, 1] += 1.0
+        x[40:, 1, 1] -= 1.5
+        with tempfile.TemporaryDirectory() as folder:
+            with open(os.path.join(folder, "metadata.json"), "w", encoding="utf-8") as file:
+                json.dump({"bounds": [[0, 5]] * 3}, file)
+            with h5py.File(os.path.join(folder, "a.h5"), "w") as file:
+                file["00000/position"] = x % 5
+            pieces = lagrangebench_gns.together(os.path.join(folder, "a.h5"), 20)
+        self.assertEqual(len(pieces), 2)
+        for k, piece in enumerate(pieces):
+            part = x[20 * k : 20 * k + 20]
+            difference = (piece - piece[:1, :1]) - (part - part[:1, :1])
+            self.assertLess(np.abs(difference).max(), 1e-9)
 
 
 if __name__ == "__main__":

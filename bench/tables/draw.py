@@ -10,14 +10,15 @@ ZERO = 1e-20  # where exactly 0 is drawn: below all that is not
 def momentum(curves, path):
     """curves: (label, error after each step, paper's row or not)."""
     figure, axes = plt.subplots(figsize=(7, 4), layout="constrained")
-    exact = [label for label, error in curves if error and not any(error)]
     for label, error in curves:
         if error and any(error):
             values = np.where(np.array(error) == 0, ZERO, error)
             axes.plot(np.arange(1, len(error) + 1), values, label=label, linewidth=1.3)
-    for label, error in curves:
-        if label in exact:
-            axes.plot(np.arange(1, len(error) + 1), np.full(len(error), ZERO), label=f"{label}: exactly 0", linewidth=2.5)
+    exact = [(label, len(error)) for label, error in curves if error and not any(error)]
+    if exact:
+        steps = max(count for _, count in exact)
+        names = "; ".join(label for label, _ in exact)
+        axes.plot(np.arange(1, steps + 1), np.full(steps, ZERO), label=f"{names}: exactly 0", linewidth=2.5)
     axes.axhline(1e-13, color="gray", linestyle=":", linewidth=1)
     axes.annotate("the paper's bound for ASCC, 1e-13", (1, 1.3e-13), fontsize=7, color="gray")
     axes.set(yscale="log", ylim=(ZERO / 10, None), xlabel="step", ylabel="|P(t) - P(0)| / |P(0)|")
@@ -45,7 +46,7 @@ def scenes(rows, path):
             panel.set(aspect="equal", xticks=[], yticks=[])
             panel.set_title(f"{label}\n{what}", fontsize=7)
             if frames is None:
-                panel.text(0.5, 0.5, "no model file", ha="center", fontsize=8, transform=panel.transAxes)
+                panel.text(0.5, 0.5, "no network", ha="center", fontsize=8, transform=panel.transAxes)
                 continue
             trace = frames[:, :: max(1, frames.shape[1] // 24)]
             panel.plot(trace[:, :, 0], trace[:, :, 1], color="0.75", linewidth=0.5, zorder=1)

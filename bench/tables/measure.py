@@ -9,7 +9,7 @@ import sys
 
 import numpy as np
 
-from cache import File
+from cache import Failed, File
 
 ROOT = os.path.abspath(os.path.join(os.path.dirname(__file__), "..", ".."))
 sys.path.insert(0, os.path.join(ROOT, "examples", "convert"))
@@ -21,8 +21,19 @@ FRAME = 0.02  # s: of a frame in section 5.4
 SPH_STEP = 1e-4  # s: of the paper's reference
 
 
-class Failed(Exception):
-    pass
+def say(text):
+    print(text, file=sys.stderr, flush=True)
+
+
+def attempt(errors, what, measure):
+    """A measurement, or None and why not: one that fails is a line of the page, not the end of it."""
+    say(what)
+    try:
+        return measure()
+    except Failed as error:
+        errors.append(f"{what}: {error}")
+        say(f"  {error}")
+        return None
 
 
 class Tools:
@@ -81,6 +92,15 @@ class Tools:
             tensorfile.write(out, tensors, metadata)
         return out
 
+    def floating(self, path):
+        """A sequence of which nobody is told that there is gravity; the path."""
+        out = self.cache.path("floating", File(path)) + ".safetensors"
+        if not os.path.exists(out):
+            tensors, metadata = tensorfile.read(path)
+            metadata["gravity"] = " ".join(["0"] * int(metadata["dim"]))
+            tensorfile.write(out, tensors, metadata)
+        return out
+
     # ---- Measures ----
 
     def evaluate(self, model, sequence):
@@ -94,7 +114,7 @@ class Tools:
             os.unlink(path + ".csv")
             return {row["figure"]: float(row["value"]) if row["value"] else None for row in rows}
 
-        return self.cache.result("eval", ["2", File(model), File(sequence)], measure)
+        return self.cache.result("eval", ["2", File(model) if os.path.exists(model) else model, File(sequence)], measure)
 
     def rollout(self, model, start, steps, every, gravity):
         """Momentum error after each step, and frames of positions: {"momentum": [], "file": path}."""
@@ -102,7 +122,7 @@ class Tools:
         def measure(path):
             return run_model(model, start, steps, every, gravity, path + ".npy")
 
-        made_from = ["2", File(model), File(start), steps, every, list(gravity)]
+        made_from = ["3", File(model), File(start), steps, every, list(gravity)]
         value = self.cache.result("rollout", made_from, measure)
         return value["momentum"], np.load(self.cache.path("rollout", *made_from) + ".npy"), value["note"]
 
@@ -161,7 +181,7 @@ def block(path, side, frames):
 
 
 def run_model(model, start, steps, every, gravity, out):
-    """|P(t) - P(0) - t m g| / (|P(0)| + 1e-10) in whole quanta, and positions."""
+    """|P(t) - P(0) - t m g| / (|P(0)| + 1e-10) in whole quanta, and positions: the last ones, too, if it ends early."""
     import ascc
 
     tensors, metadata = tensorfile.read(start)
@@ -172,6 +192,8 @@ def run_model(model, start, steps, every, gravity, out):
         raise Failed(str(error)) from None
     water = ascc.Particles(network, mass=float(metadata["particle_mass"]))
     water.add_fluid(x, v)
+    if len(tensors["boundary.position"]):
+        water.add_boundary(tensors["boundary.position"], tensors["boundary.normal"])
     step = ascc.Step(network)
     first = np.array(water.total_momentum(), float) * water.momentum_quantum
     own, momentum, frames, note = np.array(water.total_momentum(), object), [], [np.array(water.position)], ""
@@ -181,6 +203,7 @@ def run_model(model, start, steps, every, gravity, out):
             step.run(water, 1, gravity=gravity)
         except ascc.Error as error:
             note = f"stopped at step {t}: {error}"
+            frames.append(np.array(water.position))
             break
         given = given + np.array(step.statistics.external_impulse, object)
         lost = np.array(water.total_momentum(), object) - own - given

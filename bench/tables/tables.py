@@ -4,17 +4,20 @@
 import argparse
 import csv
 import json
+import math
 import os
-import sys
-
-import numpy as np
 
 import ablation
 import draw
 import page
+import scenes
+import training
 from cache import Cache
-from measure import ROOT, Failed, Tools, tensorfile
+from measure import ROOT, Tools, attempt, say, tensorfile
+from sequences import World, drifting_drops
 
+PARTS = ("2d", "3d", "ablation", "speed")
+UNTOLD = ", no gravity given"
 SHORT = 31  # frames by which Table 2 compares: what is trained so shortly does not last much longer
 HERE = os.path.dirname(os.path.abspath(__file__))
 
@@ -26,8 +29,16 @@ class Size:
         self.quick = quick
         self.sequences = 1 if quick else 5  # of Tables 1 and 2 (at most 2)
         self.frames = 40 if quick else 501  # of each at most, 0.005 s apart
+        self.made = 2 if quick else 12  # sequences to learn from, beside the given and a few of still water and drops
         self.steps = 100 if quick else 500  # of momentum
         self.fall = 60 if quick else 200  # steps of Figure 5
+        self.seconds = 3 if quick else 90  # of CPU time that a network of Table 1 is trained for
+        self.seconds_3d = 5 if quick else 120  # in 3D
+        self.tuning = 3 if quick else 30  # for a choice of learning rate and noise
+        self.sample = 3 if quick else 12  # iterations of each stage that say how many will take so long
+        self.rates = 1 if quick else 3  # learning rates to choose from
+        self.noises = 0 if quick else 2  # then noises, beside that of the config
+        self.seeds = 1 if quick else 3  # of the networks of Tables 1 and 2; one in 3D
         self.iterations = 5 if quick else 100  # of training in Table 2, per cent
         self.particles = 2000 if quick else 50000
         self.more = 8000 if quick else 1000000
@@ -38,23 +49,46 @@ class Size:
                 raise SystemExit(f"--set {change}: NAME=NUMBER, NAME one of {', '.join(list(vars(self))[1:])}")
             setattr(self, name, int(number))
 
+
 def methods():
-    """Rows of methods.csv with the path of the model, or None, and where from."""
     with open(os.path.join(HERE, "methods.csv"), encoding="utf-8", newline="") as file:
-        rows = list(csv.DictReader(file))
-    for row in rows:
-        row["path"] = next((path for path in places(row["model"]) if os.path.exists(path)), None)
-        row["seconds"] = row["path"] and training_seconds(row["path"])
-    return rows
+        return [{**row, "trained": row["trained"] == "yes", "runs": []} for row in csv.DictReader(file)]
 
 
-def training_seconds(path):
-    """What the training log beside a model says that it took, or None."""
-    try:
-        with open(path[: -len(".safetensors")] + ".csv", encoding="utf-8", newline="") as file:
-            return float(list(csv.DictReader(file))[-1]["cpu_seconds"])
-    except (OSError, IndexError, KeyError, ValueError):
-        return None
+def choose(tools, size, model, plane):
+    """Learning rate and noise of a 2D network, by the error after 20 steps on sequences that nobody learns from."""
+
+    def judge(path):
+        errors = [tools.evaluate(path, sequence)["rmse_20"] for sequence in plane.valid]
+        return math.inf if None in errors else sum(errors) / len(errors)
+
+    tries = (size.rates, size.noises)
+    return training.tune(tools, model, plane.train, size.tuning, each_of(tools, size, model, plane), tries, judge)
+
+
+def each_of(tools, size, model, world):
+    """CPU seconds of an iteration of each stage."""
+    return training.cost(tools, training.setup(model, world.train, 1, training.RATES[0], 1), size.sample)
+
+
+def networks(tools, size, row, rows, world, plane):
+    """Each network of a row; a row without training is a shipped file. rows, plane: of 2D, where rates are chosen."""
+    if not row["trained"]:
+        path = next((path for path in places(row["model"]) if os.path.exists(path)), None)
+        return [{"path": path, "seconds": None}] if path else []
+    name = row["row"].removesuffix(UNTOLD)
+    model = next(other["model"] for other in rows if other["row"] == name)
+    row["rate"], row["noise"] = choose(tools, size, model, plane)
+    made = []
+    for seed in range(1, world.seeds + 1):
+        config = training.setup(row["model"], world.train, seed, row["rate"], row["noise"])
+        if name != row["row"]:
+            config = training.without_gravity(config)
+        network = training.train(tools, config, world.seconds, each_of(tools, size, row["model"], world))
+        weights = sum(tensor.size for tensor in tensorfile.read(network["path"])[0].values())
+        made.append({**network, "jitter": config["jitter"], "weights": weights})
+        say(f"  seed {seed}: {made[-1]['iterations']} iterations in {made[-1]['seconds']:.0f} CPU s")
+    return made
 
 
 def places(name):
@@ -64,100 +98,48 @@ def places(name):
     ]
 
 
-def say(text):
-    print(text, file=sys.stderr, flush=True)
-
-
-def attempt(errors, what, measure):
-    """A measurement, or None and why not: one that fails is a line of the page, not the end of it."""
-    say(what)
-    try:
-        return measure()
-    except Failed as error:
-        errors.append(f"{what}: {error}")
-        say(f"  {error}")
-        return None
-
-
-def test_sequences(tools, size, shared):
-    """The given test sequences, two, and generated ones, all with frames of 0.005 s."""
-    given = [os.path.join(shared, "data", "wbc2d", "test", f"test_0{i}.safetensors") for i in range(2)]
-    given = [path for path in given if os.path.exists(path)][: size.sequences]
-    wanted = size.sequences - len(given)
-    made = [tools.generated("wbc2d", size.frames, 900 + i, 0.005, "--solver", "sph") for i in range(wanted)]
-    return [tools.cut(path, size.frames, 2) for path in given] + made
-
-
-def drifting_drops(tools):
-    """Two drops that collide while both drift: else their momentum, which errors are measured by, would be 0."""
-    return tools.drifting(tools.generated("droplets", 2, 900, 0.005, "--dimension", "2"), (0.5, 0.25))
-
-
-def table1(tools, size, rows, shared, errors):
-    sequences = test_sequences(tools, size, shared)
-    start = drifting_drops(tools)
+def table1(tools, size, rows, told, flat, plane, errors):
+    """Trains and measures the rows of one dimension. flat, plane: rows and sequences of 2D."""
     for row in rows:
-        row["figures"], row["momentum"] = [], None
-        if not row["path"]:
-            continue
-        for i, sequence in enumerate(sequences):
-            found = attempt(errors, f"{row['model']} on test sequence {i}", lambda s=sequence: tools.evaluate(row["path"], s))
-            row["figures"] += [found] if found else []
-        row["momentum"] = attempt(
-            errors, f"{row['model']}: momentum", lambda: tools.rollout(row["path"], start, size.steps, 10, (0, 0))
-        )
-    return len(sequences)
+        untold = row["row"].endswith(UNTOLD)
+        world = told.without_gravity(tools) if untold else told
+        start = drifting_drops(tools, row["dimension"])
+        still = (0, 0, 0)[: int(row["dimension"])]
+        made = attempt(errors, f"training: {row['row']}", lambda r=row, w=world: networks(tools, size, r, flat, w, plane))
+        for network in made or []:
+            path = network["path"]
+            found = [
+                attempt(errors, f"{row['row']} on test sequence {i}", lambda s=sequence, p=path: tools.evaluate(p, s))
+                for i, sequence in enumerate(world.test)
+            ]
+            # What learnt gravity cannot be asked what it does without.
+            momentum = None if untold else attempt(
+                errors, f"{row['row']}: momentum", lambda p=path, s=start: tools.rollout(p, s, size.steps, 10, still)
+            )  # fmt: skip
+            row["runs"].append({**network, "momentum": momentum, "figures": [f for f in found if f]})
 
 
-def table2(tools, size, shared, errors):
-    if not os.path.isdir(os.path.join(shared, "data", "wbc2d")):
-        return []
-    sequences = test_sequences(tools, size, shared)[:2]
+def table2(tools, size, world, errors):
+    sequences = world.test[:2]
     short = [tools.cut(path, SHORT, 1) for path in sequences]
     start = drifting_drops(tools)
     found = []
     for name, network, schedule, text in ablation.ROWS:
-        made = attempt(
-            errors, f"training: {name}", lambda: ablation.train(tools, network, schedule, size.iterations, shared)
-        )
-        if not made:
-            found.append({"row": name, "text": text})
-            continue
-        model, seconds = made
-        figures, whole = (
-            [f for s in list if (f := attempt(errors, f"{name} on a test sequence", lambda: tools.evaluate(model, s)))]
-            for list in (short, sequences)
-        )
-        momentum = attempt(errors, f"{name}: momentum", lambda: tools.rollout(model, start, size.steps, 10, (0, 0)))
-        found.append({"row": name, "text": text, "seconds": seconds, "figures": figures, "whole": whole,
-                      "momentum": momentum})  # fmt: skip
+        row = {"row": name, "text": text, "runs": []}
+        for seed in range(1, world.seeds + 1):
+            config = ablation.config_of(network, schedule, world.train, seed, size.iterations)
+            made = attempt(errors, f"training: {name}, seed {seed}", lambda c=config: training.run(tools, c))
+            if not made:
+                continue
+            path, spent = made
+            figures, whole = (
+                [f for s in list if (f := attempt(errors, f"{name} on a test sequence", lambda: tools.evaluate(path, s)))]
+                for list in (short, sequences)
+            )
+            momentum = attempt(errors, f"{name}: momentum", lambda: tools.rollout(path, start, size.steps, 10, (0, 0)))
+            row["runs"].append({"seconds": spent[-1], "figures": figures, "whole": whole, "momentum": momentum})
+        found.append(row)
     return found
-
-
-def figure5(tools, size, rows, errors):
-    """Truth and methods in free fall and in a collision, without and with gravity."""
-    every = size.fall // 20
-    fall = tools.generated("free-fall", size.fall + 1, 900, 0.005, "--dimension", "2")
-    drops = tools.generated("droplets", size.fall + 1, 900, 0.005, "--dimension", "2")
-    def truth(path, gravity):
-        x = tensorfile.read(path)[0]["fluid.position"][::every].astype(float)
-        t = np.arange(len(x)) * every * 0.005
-        return x + 0.5 * np.array(gravity)[None, None] * (t**2)[:, None, None]
-
-    lines = []
-    for what, path, gravity, added in (
-        ("free fall", fall, (0, -9.81), (0, 0)),
-        ("two drops, no gravity", drops, (0, 0), (0, 0)),
-        ("two drops, gravity", drops, (0, -9.81), (0, -9.81)),
-    ):
-        panels = [("truth", truth(path, added), "")]
-        for row in rows:
-            run = row["path"] and attempt(
-                errors, f"{row['model']}: {what}",
-                lambda r=row, p=path, g=gravity: tools.rollout(r["path"], p, size.fall, every, g))  # fmt: skip
-            panels.append((row["row"], run[1] if run else None, run[2] if run else ""))
-        lines.append((what, panels))
-    return lines
 
 
 SPEED = [  # label, model, largest number of particles it is asked for (0: all)
@@ -181,29 +163,49 @@ def speed(tools, size, errors):
     return found, sph
 
 
+def floor(tools, path, errors):
+    return attempt(errors, f"free flight: {os.path.basename(path)}", lambda: tools.evaluate("ballistic", path)) or {}
+
+
 def main():
     parser = argparse.ArgumentParser(prog="run.sh", description=__doc__)
     parser.add_argument("--quick", action="store_true", help="smaller runs, a few minutes")
     parser.add_argument("--set", action="append", default=[], metavar="NAME=NUMBER", help="another size of one run")
+    parser.add_argument("--minutes", type=float, help="begin nothing new after so many: what is missing is told, and the same command goes on")
+    parser.add_argument("--only", choices=PARTS, help="measure this part, write no page: several can run side by side")
     parser.add_argument("--build", default="build")
     parser.add_argument("--shared", default=os.path.join(ROOT, "..", "shared"))
     parser.add_argument("--page", default=os.path.join(ROOT, "docs", "tables.md"))
     options = parser.parse_args()
     size, errors = Size(options.quick, options.set), []
-    shared = os.path.abspath(options.shared)
-    tools = Tools(options.build, Cache(os.path.join(options.build, "tables")), options.quick)
+    cache = Cache(os.path.join(options.build, "tables"), None if options.minutes is None else 60 * options.minutes)
+    tools = Tools(options.build, cache, options.quick)
     with open(os.path.join(HERE, "paper.json"), encoding="utf-8") as file:
         paper = json.load(file)
     rows = methods()
-    sequences = table1(tools, size, rows, shared, errors)
-    lines = figure5(tools, size, rows, errors)
-    ablations = table2(tools, size, shared, errors)
-    costs, sph = speed(tools, size, errors)
+    flat, solid = ([row for row in rows if row["dimension"] == d] for d in "23")
+    shared = os.path.abspath(options.shared)
+    plane, space = (World(tools, size, dimension, shared) for dimension in "23")
+    asked = lambda part: options.only in (None, part)  # noqa: E731
+    if asked("2d"):
+        table1(tools, size, flat, plane, flat, plane, errors)
+    if asked("3d") and space.test:
+        table1(tools, size, solid, space, flat, plane, errors)
+    ablations = table2(tools, size, plane, errors) if asked("ablation") else []
+    costs, sph = speed(tools, size, errors) if asked("speed") else ([], None)
+    if options.only:
+        raise SystemExit(3 if cache.left else 0)
+    lines = scenes.figure5(tools, size, flat, errors)
+    failing = scenes.failures(tools, flat, plane, (20, 60, 100, 200, 400), errors)
     figures = os.path.join(os.path.dirname(os.path.abspath(options.page)), "figures")
     os.makedirs(figures, exist_ok=True)
-    draw.momentum([(r["row"], r["momentum"][0]) for r in rows if r["momentum"]], os.path.join(figures, "tables-momentum.png"))
+    curves = [(r["row"], r["runs"][0]["momentum"][0]) for r in flat if r["runs"] and r["runs"][0]["momentum"]]
+    draw.momentum(curves, os.path.join(figures, "tables-momentum.png"))
     draw.scenes(lines, os.path.join(figures, "tables-scenes.png"))
-    page.write(options.page, size, paper, rows, sequences, ablations, costs, sph, errors)
+    draw.scenes(failing, os.path.join(figures, "tables-failures.png"))
+    floors = {d: [floor(tools, path, errors) for path in world.test] for d, world in (("2", plane), ("3", space))}
+    page.write(options.page, size, paper, rows, floors, ablations, costs, sph, errors)
+    raise SystemExit(3 if cache.left else 0)
 
 
 if __name__ == "__main__":
