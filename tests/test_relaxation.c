@@ -717,6 +717,31 @@ static void a_second_round_is_what_a_step_from_the_first_one_does(void **state)
     }
 }
 
+static void a_round_is_left_out_where_the_first_one_was_enough(void **state)
+{
+    (void)state;
+    static const char *const more[] = {"", ",\"rounds\":{\"most\":4,\"above\":0.2}",
+                                       ",\"rounds\":{\"most\":4,\"above\":0.2,\"left\":0.2}",
+                                       ",\"rounds\":{\"most\":4,\"above\":0.2,\"left\":0.001}"};
+    for (int d = 2; d <= 3; d++) {
+        uint64_t hash[4], sweeps[4];
+        for (int k = 0; k < 4; k++) {
+            static double x[200 * 3];
+            const int side[3] = {5, 5, 5};
+            world w;
+            open_pbf(&w, d, 0.0, 8, more[k]);
+            const double apart = spacing * pow(0.8 / 1.35, 1.0 / d);
+            add_fluid(&w, lattice(d, side, apart, 0.0, x), x, NULL, NULL);
+            check_good(&w, ascc_step_run(w.step, w.particles, NULL, 1));
+            hash[k] = ascc_particles_hash(w.particles);
+            sweeps[k] = statistics_of(&w).sweeps;
+            close_world(&w);
+        }
+        assert_true(hash[2] == hash[0] && hash[1] != hash[0] && hash[3] != hash[0]);
+        assert_true(sweeps[2] == 8 && sweeps[1] > 8 && sweeps[3] > 8);
+    }
+}
+
 /* Faster than lists reach: where the network saw them, most of these particles were below the floor. */
 static void an_impact_on_a_floor_is_less_dense_after_more_rounds(void **state)
 {
@@ -1101,6 +1126,9 @@ static void bad_constants_are_refused_by_name(void **state)
          "\"limit\":0.01,\"rounds\":{\"most\":2,\"above\":0}}",
          "above"},
         {"{\"support\":0.1,\"rest_volume\":1e-4,\"omega\":[0.5,0.5,0.5,0.5],\"epsilon\":0.1,"
+         "\"limit\":0.01,\"rounds\":{\"most\":2,\"above\":0.2,\"left\":0.3}}",
+         "left"},
+        {"{\"support\":0.1,\"rest_volume\":1e-4,\"omega\":[0.5,0.5,0.5,0.5],\"epsilon\":0.1,"
          "\"limit\":0.01,\"rounds\":{\"most\":2}}",
          "above"},
         {"{\"support\":0.1,\"rest_volume\":1e-4,\"omega\":[0.5,0.5,0.5,0.5],\"epsilon\":0.1,"
@@ -1172,6 +1200,7 @@ int main(void)
         cmocka_unit_test(a_block_at_rest_density_is_left_alone),
         cmocka_unit_test(a_compressed_block_spreads_to_rest_density),
         cmocka_unit_test(a_second_round_is_what_a_step_from_the_first_one_does),
+        cmocka_unit_test(a_round_is_left_out_where_the_first_one_was_enough),
         cmocka_unit_test(an_impact_on_a_floor_is_less_dense_after_more_rounds),
         cmocka_unit_test(a_compressed_block_on_a_floor_moves_up_and_the_floor_down),
         cmocka_unit_test(the_density_of_walls_does_not_matter),

@@ -449,7 +449,8 @@ static void gradients_through_the_relaxation_are_right(void **state)
                            ",\"guess\":\"guess\"}");
         if (v % 2)
             (void)snprintf(text + strlen(text) - 1, sizeof text - strlen(text) + 1,
-                           ",\"rounds\":{\"most\":%d,\"above\":0.001}}", 2 + v / 4);
+                           ",\"rounds\":{\"most\":%d,\"above\":0.3,\"left\":%s}}", 2 + v / 4,
+                           v % 4 == 1 ? "0.1" : "0.3");
         if (v % 4 != 1)
             (void)snprintf(text + strlen(text) - 1, sizeof text - strlen(text) + 1,
                            ",\"hyperviscosity\":{\"shares\":[0.5%s],\"below\":%s}}",

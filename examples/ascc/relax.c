@@ -27,7 +27,7 @@ typedef struct relax {
     int32_t dimension; /* of a new one */
     double spacing, time_step;
     bool none, current;
-    double rounds, again, below;
+    double rounds, again, left, below;
     double omega[SWEEPS], divergence[SWEEPS], viscosity[SWEEPS];
     int omega_count, divergence_count, viscosity_count;
     /* Lengths in spacings, volume in spacings^dimension. */
@@ -50,6 +50,7 @@ static const char help[] =
     "left (1)\n"
     "  --again E             another round follows one that began with an excess of density above "
     "this (0.2)\n"
+    "  --left E              and would find more than this (anything)\n"
     "  --support H           of the cubic spline (2)\n"
     "  --volume V            of a particle at rest, spacings^dimension (0.8)\n"
     "  --epsilon E           softening (0.1)\n"
@@ -101,7 +102,8 @@ static bool read_option(relax *r, const char *name, const char *value)
         {"--spacing", &r->spacing},     {"--dt", &r->time_step},        {"--support", &r->support},
         {"--volume", &r->volume},       {"--epsilon", &r->epsilon},     {"--limit", &r->limit},
         {"--repulsion", &r->repulsion}, {"--stiffness", &r->stiffness}, {"--contact", &r->contact},
-        {"--rounds", &r->rounds},       {"--again", &r->again},         {"--below", &r->below},
+        {"--rounds", &r->rounds},       {"--again", &r->again},         {"--left", &r->left},
+        {"--below", &r->below},
     };
     double number;
     for (size_t i = 0; i < sizeof numbers / sizeof *numbers; i++)
@@ -133,7 +135,7 @@ static bool read_arguments(relax *r, int argc, char **argv)
         "--spacing",   "--dt",        "--support", "--volume", "--epsilon",    "--limit",
         "--repulsion", "--stiffness", "--contact", "--omega",  "--divergence", "--hyperviscosity",
         "--new",       "--name",      "-o",        "--none",   "--current",    "--below",
-        "--rounds",    "--again",     NULL};
+        "--rounds",    "--again",     "--left",    NULL};
     for (int i = 0; i < argc; i++) {
         if (strcmp(argv[i], "--none") == 0) {
             r->none = true;
@@ -183,6 +185,8 @@ static json_t *relaxation_of(const relax *r, int32_t dimension, double spacing)
     if (r->rounds != 1.0)
         json_object_set_new(
             o, "rounds", json_pack("{s:I,s:f}", "most", (json_int_t)r->rounds, "above", r->again));
+    if (r->rounds != 1.0 && r->left >= 0.0)
+        json_object_set_new(json_object_get(o, "rounds"), "left", json_real(r->left));
     if (r->repulsion > 0.0)
         json_object_set_new(
             o, "repulsion",
@@ -320,6 +324,7 @@ int ascc_command_relax(int argc, char **argv)
                .stiffness = 0.5,
                .rounds = 1.0,
                .again = 0.2,
+               .left = -1.0,
                .below = 0.1,
                .contact = 0.4};
     if (!read_arguments(&r, argc, argv))

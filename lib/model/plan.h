@@ -138,14 +138,15 @@ typedef struct ascc_sweeps {
 typedef struct ascc_relaxation {
     ascc_sweeps pressure; /* none = there is no relaxation */
     ascc_sweeps divergence;
-    ascc_sweeps viscosity;       /* of roughness: how much of its roughness each sweep takes */
-    double viscosity_below;      /* what is rougher than this is left alone, m/s */
-    int32_t rounds;              /* of pressure sweeps at most: 1 or more */
-    double again;                /* another one follows one that began with an excess above this */
-    double epsilon;              /* of the lattice's response, added to each particle's own */
-    double support;              /* of the cubic spline, m */
-    double rest_volume;          /* of a particle, m^dimension */
-    double limit;                /* the greatest correction of a position by one pair, m */
+    ascc_sweeps viscosity;  /* of roughness: how much of its roughness each sweep takes */
+    double viscosity_below; /* what is rougher than this is left alone, m/s */
+    int32_t rounds;         /* of pressure sweeps at most: 1 or more */
+    double again;           /* another one follows one that began with an excess above this */
+    double left;        /* and only if those before left one above this; -1 = whatever they left */
+    double epsilon;     /* of the lattice's response, added to each particle's own */
+    double support;     /* of the cubic spline, m */
+    double rest_volume; /* of a particle, m^dimension */
+    double limit;       /* the greatest correction of a position by one pair, m */
     double repulsion, stiffness; /* pairs nearer than this, m, part by this share of the lack */
     double contact;              /* as of an output, for a model that has none there; m */
     int32_t current_direction;   /* corrections are turned to the lines before the step */

@@ -148,6 +148,8 @@ static void read_rounds(ascc_reader *reader, uint32_t object, ascc_relaxation *r
     ascc_reader_where(reader, "relaxation 'rounds'");
     r->rounds = ascc_reader_integer(reader, o, "most", 1, ASCC_MAX_ROUNDS);
     r->again = ascc_reader_number(reader, o, "above", 1e-3, 1e3);
+    if (ascc_reader_has(reader, o, "left"))
+        r->left = ascc_reader_number(reader, o, "left", 0.0, r->again);
     ascc_reader_end(reader, o);
     ascc_reader_where(reader, "relaxation");
 }
@@ -159,7 +161,7 @@ void ascc_relaxation_read(ascc_reader *reader, uint32_t object, ascc_plan_builde
     if (!ascc_reader_has(reader, object, "relaxation"))
         return;
     const uint32_t o = ascc_reader_object(reader, object, "relaxation");
-    ascc_relaxation r = {.rounds = 1};
+    ascc_relaxation r = {.rounds = 1, .left = -1.0};
     ascc_reader_where(reader, "relaxation");
     r.support = ascc_reader_number(reader, o, "support", ASCC_PLAN_MIN, ASCC_PLAN_MAX);
     r.rest_volume = ascc_reader_number(reader, o, "rest_volume", 1e-45, 1e45);

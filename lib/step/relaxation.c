@@ -878,6 +878,10 @@ static ascc_status relax(ascc_step_state *state, relaxation *r, int64_t *given,
     status = measure(r, found);
     if (status == ASCC_OK && first)
         s->compression_before = *found;
+    if (status == ASCC_OK && !first && found->largest <= r->constants->left) {
+        state->relaxed.round[--state->relaxed.rounds].trace.low = NULL; /* as if it had not begun */
+        return ASCC_OK;
+    }
     if (status == ASCC_OK)
         status = sweep(r, &r->constants->pressure);
     if (status == ASCC_OK)

@@ -157,8 +157,8 @@ static void relax_velocities(scene *s, double step, double *velocity)
 }
 
 /* How rough velocities are (docs/method.md), of pairs of these coefficients. */
-static void roughness(const scene *s, const double coefficient[MOST],
-                      const double velocity[MOST][3], double rough[MOST][3])
+static void roughness(const scene *s, const double coefficient[MOST], double velocity[MOST][3],
+                      double rough[MOST][3])
 {
     for (size_t i = 0; i < s->fluid; i++) {
         memset(rough[i], 0, sizeof rough[i]);
@@ -236,13 +236,16 @@ void relaxation_oracle(const ascc_plan *plan, size_t fluid, size_t walls, const 
     find_geometry(s);
     bool again = true;
     for (int32_t n = 0; n < r->rounds && again; n++) {
-        double excess[MOST];
+        double excess[MOST], most = 0.0;
         again = false;
         for (size_t i = 0; i < fluid; i++) {
             excess[i] = s->density[i] - 1.0;
+            most = fmax(most, excess[i]);
             again |= excess[i] > r->again;
             s->p[i] = guess && n == 0 ? guess[i] / r->lattice_response : 0.0;
         }
+        if (n > 0 && most <= r->left)
+            break;
         sweep(s, &r->pressure, excess, r->repulsion / r->support);
         for (size_t i = 0; i < fluid; i++)
             for (size_t c = 0; c < s->d; c++) {
