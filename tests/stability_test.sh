@@ -57,6 +57,10 @@ holds 'a paddle leaves nothing behind' grep -qE '^paddle +pbf3d .* pass: 24 of 2
 holds 'a cup of one sheet holds what is in it' grep -qE '^thin cup +pbf3d .* pass: 24 of 24' out
 holds 'free flight leaves it' grep -qE '^thin cup +ballistic .* escaped$' out
 holds 'what a method cannot do is no pass' [ "$(grep -c ' cannot: ' out)" = 2 ]
+"$stability" --quick --frames 40 --methods ballistic --model "$models/water3d-tiny.safetensors" --jobs 1 \
+    --scenes 'sleep and wake' >out 2>err
+holds 'a method that knows no sleep says so' grep -q '^sleep and wake  *ballistic .* cannot: no sleep' out
+holds 'a pool that is awake does not pass for asleep' grep -q '^sleep and wake  *water3d-tiny .* 0 % asleep at half' out
 "$stability" --quick --dimension 2 --frames 20 --docs docs --methods ballistic --model "$models/pbf2d.safetensors" \
     --scenes 'turned tank;sideways gravity;dam break' >out 2>err
 holds 'a flat tank may turn' grep -qE '^turned tank +pbf2d .* pass: 20 of 20' out

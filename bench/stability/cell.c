@@ -126,6 +126,16 @@ bool cell_takes_fluid(cell *c)
     return c->method->add_fluid || cannot(c, "no fluid on the way");
 }
 
+bool cell_sleeps(cell *c)
+{
+    return c->method->asleep || cannot(c, "no sleep");
+}
+
+double cell_asleep(const cell *c, const simulation *s)
+{
+    return (double)c->method->asleep(s->state) / (double)s->scene.fluid_count;
+}
+
 bool cell_drive_body(cell *c, simulation *s, const double velocity[3], const double spin[3])
 {
     ascc_method_error error = {"the body cannot be moved"};

@@ -50,9 +50,12 @@ void cell_say(cell *c, const char *format, ...)
 
 /* False: the method refused the world, and the cell has failed. Close either way. */
 bool cell_open(cell *c, world *w, simulation *s);
-/* False: the method moves no bodies, or takes no fluid on the way, and the cell says so. */
+/* False: the method moves no bodies, takes no fluid on the way, or knows no sleep, and the cell says so. */
 bool cell_has_bodies(cell *c);
 bool cell_takes_fluid(cell *c);
+bool cell_sleeps(cell *c);
+/* The share of the fluid that sleeps. */
+double cell_asleep(const cell *c, const simulation *s);
 /* Moves the body of the world in the next frame; its wall points are then where it ends. */
 bool cell_drive_body(cell *c, simulation *s, const double velocity[3], const double spin[3]);
 /* The body at its mass, kg, for a frame: what the fluid gave it in the last one and gravity. */

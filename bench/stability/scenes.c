@@ -489,5 +489,16 @@ const stability_scene stability_scenes[] = {
      "beginning, "
      "away from walls and surface",
      200, 500, stability_tap},
+    {"sleep and wake",
+     "a pool may sleep: all of it does by half of the frames, then stays to the bit; a plate that "
+     "goes 2 "
+     "spacings in 20 frames wakes a half at least; no escape, nothing half as fast as a fall "
+     "through the box",
+     200, 600, stability_sleep_and_wake},
+    {"pool with a drop",
+     "a drop falls on a pool of which some fell asleep in half of the frames: nothing faster by a "
+     "tenth than "
+     "where none may sleep, no escape, no pair in 1,000 below spacing / 5",
+     200, 400, stability_pool_with_a_drop},
     {NULL, NULL, 0, 0, NULL},
 };

@@ -28,5 +28,8 @@ void stability_narrow_slab(cell *c);
 void stability_paddle(cell *c);
 void stability_turned_tank(cell *c);
 void stability_tap(cell *c);
+/* Those of resting.c. */
+void stability_sleep_and_wake(cell *c);
+void stability_pool_with_a_drop(cell *c);
 
 #endif

@@ -31,6 +31,7 @@ typedef struct ascc_method_scene {
     size_t first_layer;          /* wall points that touch the fluid: the first so many */
     size_t body_count;           /* wall points of a body that moves: the last so many */
     double body_center[3];       /* what it turns about, and takes along */
+    double sleep_speed;          /* fluid slower than this stops, if the method can; 0 = none */
 } ascc_method_scene;
 
 /** Why a method failed. */
@@ -65,6 +66,8 @@ typedef struct ascc_method {
     /* Adds fluid behind what there is; the caller then raises the scene's count. NULL if the method cannot. */
     bool (*add_fluid)(void *state, size_t count, const double *position, const double *velocity,
                       ascc_method_error *error);
+    /* Particles that sleep after the last frame; NULL if the method knows no sleep. */
+    size_t (*asleep)(const void *state);
     void (*close)(void *state);
 } ascc_method;
 

@@ -144,7 +144,8 @@ static bool learned_set(void *state, const double *position, const double *veloc
                                               .spacing = m->scene->spacing,
                                               .mass = m->scene->mass};
     const ascc_step_options step = {.size = sizeof step,
-                                    .time_step = fabs(dt - m->time_step) > 1e-6 * dt ? dt : 0.0};
+                                    .time_step = fabs(dt - m->time_step) > 1e-6 * dt ? dt : 0.0,
+                                    .sleep_speed = m->scene->sleep_speed};
     (void)kind;
     m->driven = false;
     ascc_particles_destroy(&m->particles);
@@ -245,6 +246,13 @@ static void learned_body_impulse(const void *state, double impulse[3])
         impulse[c] = (double)quanta[0][c] * quantum;
 }
 
+static size_t learned_asleep(const void *state)
+{
+    const learned *m = state;
+    ascc_step_statistics told = {.size = sizeof told};
+    return ascc_step_get_statistics(m->step, &told) == ASCC_OK ? (size_t)told.asleep : 0;
+}
+
 static bool learned_add_fluid(void *state, size_t count, const double *position,
                               const double *velocity, ascc_method_error *error)
 {
@@ -268,5 +276,6 @@ const ascc_method ascc_method_model = {
     .drive_body = learned_drive_body,
     .body_impulse = learned_body_impulse,
     .add_fluid = learned_add_fluid,
+    .asleep = learned_asleep,
     .close = learned_close,
 };
