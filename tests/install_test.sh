@@ -89,6 +89,9 @@ if [ -e "$libdir/libascc-mpi.so" ]; then
     }
     check 'libascc-mpi exports what its header declares, and no more' distributed
     check 'ascc-mpi.pc asks for libascc of its version' pkg-config --print-requires ascc-mpi
+    # shellcheck disable=SC2046,SC2086
+    check 'examples/hosts/mpi.c builds against what is installed' mpicc -std=c99 $warnings examples/hosts/mpi.c \
+        -o "$folder/host_mpi" $(pkg-config --cflags --libs ascc-mpi)
 fi
 exports() { nm -D --defined-only "$library" | awk '{ print $3 }' | LC_ALL=C sort | diff - tests/exports.txt; }
 check 'it exports what tests/exports.txt lists' exports

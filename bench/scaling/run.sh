@@ -1,7 +1,7 @@
 #!/bin/sh
 # Measures what processes exchange, fits it and draws docs/figures/processes.svg: sh bench/scaling/run.sh [--build DIR]
-# [--model FILE] [--draw]. --draw measures nothing and draws what docs/figures/processes.csv has. The machine may have
-# fewer cores than there are processes. SPDX-License-Identifier: MIT
+# [--model FILE] [--draw]; docs/scaling.md tells what came out. --draw measures nothing and draws what
+# docs/figures/processes.csv has. The machine may have fewer cores than there are processes. SPDX-License-Identifier: MIT
 cd "$(dirname "$0")/../.." || exit 1
 build=build
 model=examples/models/water3d.safetensors
@@ -23,7 +23,7 @@ if [ -z "$draw" ]; then
     mpirun -n 1 "$build/bench/scaling" >"$csv.part" || exit 1
     for side in 32 48 64; do
         for processes in 2 3 4 6 8 12 16; do
-            mpirun -n $processes "$build/bench/scaling" "$model" $side 2 1 >>"$csv.part" || exit 1
+            mpirun -n $processes "$build/bench/scaling" "$model" $side 1 1 >>"$csv.part" || exit 1
         done
     done
     mv "$csv.part" "$csv"
