@@ -78,14 +78,16 @@ static void copy_own(ascc_mpi_particles *set)
         from += set->counts[r];
         to += set->counts[ranks + (size_t)r];
     }
-    memcpy((corner *)set->incoming.at + to, (corner *)set->outgoing.at + from,
-           set->counts[set->rank] * sizeof(corner));
+    if (set->counts[set->rank])
+        memcpy((corner *)set->incoming.at + to, (corner *)set->outgoing.at + from,
+               set->counts[set->rank] * sizeof(corner));
 }
 
 static size_t sort_corners(corner *all, size_t count)
 {
     size_t kept = 0;
-    qsort(all, count, sizeof *all, by_place);
+    if (count)
+        qsort(all, count, sizeof *all, by_place);
     for (size_t i = 0; i < count; i++)
         if (kept == 0 || by_place(&all[i], &all[kept - 1]) != 0)
             all[kept++] = all[i];

@@ -124,20 +124,47 @@ static int by_key(const void *a, const void *b)
     return x->key < y->key ? -1 : x->key > y->key;
 }
 
-void ascc_curve_cut(ascc_curve *curve, ascc_load *load, size_t count)
+size_t ascc_loads_join(ascc_load *load, size_t count)
 {
-    uint64_t total = 0, before = 0;
-    int rank = 1;
-    qsort(load, count, sizeof *load, by_key);
+    size_t joined = 0;
+    if (count)
+        qsort(load, count, sizeof *load, by_key);
     for (size_t i = 0; i < count; i++)
-        total += load[i].count;
-    for (size_t i = 0, next; i < count; i = next) {
-        uint64_t here = 0;
-        for (next = i; next < count && load[next].key == load[i].key; next++)
-            here += load[next].count;
+        if (joined && load[joined - 1].key == load[i].key)
+            load[joined - 1].cost += load[i].cost;
+        else
+            load[joined++] = load[i];
+    return joined;
+}
+
+/* What lies before each cut, as it is now. */
+static void find_cuts(const ascc_curve *curve, const ascc_load *load, size_t count, double *cut)
+{
+    double before = 0.0;
+    size_t i = 0;
+    for (int rank = 0; rank < curve->size; rank++) {
+        for (; i < count && load[i].key < curve->first[rank]; i++)
+            before += (double)load[i].cost;
+        cut[rank] = before;
+    }
+}
+
+void ascc_curve_cut(ascc_curve *curve, const ascc_load *load, size_t count, double limit)
+{
+    double total = 0.0, before = 0.0;
+    int rank = 1;
+    for (size_t i = 0; i < count; i++)
+        total += (double)load[i].cost;
+    const double share = total / curve->size;
+    find_cuts(curve, load, count, curve->cut);
+    for (int r = 0; r < curve->size; r++) {
+        const double now = curve->cut[r], far = limit * share;
+        curve->cut[r] = fmin(fmax(share * r, now - far), now + far);
+    }
+    for (size_t i = 0; i < count; i++) {
+        const double here = (double)load[i].cost;
         /* A cut comes before the block whose middle lies behind it. */
-        while (rank < curve->size && (double)before + 0.5 * (double)here >=
-                                         (double)total * (double)rank / (double)curve->size)
+        while (rank < curve->size && before + 0.5 * here >= curve->cut[rank])
             curve->first[rank++] = load[i].key;
         before += here;
     }

@@ -16,6 +16,7 @@ typedef struct ascc_curve {
     int size;        /* processes */
     double edge;     /* of a block, host's unit */
     uint64_t *first; /* [size] of each process's keys; ascending, the first 0 */
+    double *cut;     /* [size] scratch of ascc_curve_cut */
 } ascc_curve;
 
 /* The block that a place is in; beyond 2^20 blocks from the origin all are one. */
@@ -38,12 +39,15 @@ typedef struct ascc_owners {
 void ascc_owners_find(ascc_owners *owners, const ascc_curve *curve, const double *place,
                       double reach);
 
-/* How much fluid a block has. */
+/* What the fluid of a block costs. */
 typedef struct ascc_load {
-    uint64_t key, count;
+    uint64_t key, cost;
 } ascc_load;
 
-/* Pieces of about the same load. load: [count], in any order; is sorted and joined. */
-void ascc_curve_cut(ascc_curve *curve, ascc_load *load, size_t count);
+/* Sorts loads by key and joins those of one block; returns how many are left. */
+size_t ascc_loads_join(ascc_load *load, size_t count);
+
+/* Pieces of about the same cost, of loads that are joined. limit: how far a cut may move, in costs of a piece. */
+void ascc_curve_cut(ascc_curve *curve, const ascc_load *load, size_t count, double limit);
 
 #endif

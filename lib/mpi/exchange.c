@@ -3,6 +3,7 @@
  * Everything that a step exchanges begins with an agreement, one number of each process. A process that has failed
  * takes part in the next one and in nothing more, so that nobody waits for it.
  */
+#include <limits.h>
 #include <stdio.h>
 #include <string.h>
 
@@ -183,6 +184,33 @@ ascc_status ascc_mpi_swap(ascc_mpi_particles *set, size_t size, size_t *received
     if (status == ASCC_OK)
         transfer(set, out, in, size);
     return status;
+}
+
+ascc_status ascc_mpi_share(ascc_mpi_particles *set, const void *rows, size_t count, size_t size,
+                           size_t *all)
+{
+    const size_t ranks = (size_t)set->size;
+    uint64_t *heard = set->told + ranks, own = count;
+    int *each = set->parts, *first = each + ranks;
+    MPI_Datatype row;
+    MPI_Allgather(&own, 1, MPI_UINT64_T, heard, 1, MPI_UINT64_T, set->comm);
+    set->statistics.collectives += 2;
+    *all = 0;
+    for (size_t r = 0; r < ranks; r++) {
+        first[r] = (int)ascc_min_size(*all, INT_MAX);
+        each[r] = (int)ascc_min_size((size_t)heard[r], INT_MAX);
+        *all += (size_t)heard[r];
+    }
+    const bool room = *all <= INT_MAX && ascc_mpi_room(set, &set->incoming, *all * size, 1);
+    const ascc_status status =
+        ascc_mpi_agree(set, explain(set, room ? ASCC_OK : ASCC_ERROR_MEMORY));
+    if (status != ASCC_OK)
+        return status;
+    MPI_Type_contiguous((int)size, MPI_BYTE, &row);
+    MPI_Type_commit(&row);
+    MPI_Allgatherv(rows, each[set->rank], row, set->incoming.at, each, first, row, set->comm);
+    MPI_Type_free(&row);
+    return ASCC_OK;
 }
 
 static void pack(const ascc_mpi_lists *lists, const uint32_t *map, const ascc_halo_rows *arrays,

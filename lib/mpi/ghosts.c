@@ -8,9 +8,14 @@
 
 #include "set.h"
 
-/* Steps between two looks at the balance, and the imbalance that is mended. */
+/* Steps between two looks at the balance, the imbalance that is mended, and how much of a process's share a cut may
+ * move then; a change of all fluid that asks for a look at once, and has no such limit. */
 #define LOOK 32
 #define UNEVEN 1.1
+#define FARTHEST 0.25
+#define OTHER 0.125
+/* What a row costs besides its neighbours, in neighbours: water3d's in a dam break. */
+#define ROW 25
 /* Lengths are rounded when they become integers: a share of them that covers it. */
 #define COVER 1e-6
 
@@ -59,11 +64,18 @@ static void find_place(const ascc_mpi_particles *set, size_t row, double place[3
 
 /* ---- Balance ---- */
 
+/* What fluid of this process costs: its neighbours in the last step, and what rows need beside them. */
+static uint64_t cost_of(const ascc_mpi_particles *set)
+{
+    return set->local->fluid_count * (uint64_t)ROW + set->neighbors;
+}
+
 /* Blocks with fluid of this process; false without memory. */
 static bool find_loads(ascc_mpi_particles *set, size_t *count)
 {
     const size_t rows = set->local->fluid_count;
-    *count = 0;
+    const uint64_t each = rows ? cost_of(set) / rows : 0;
+    size_t found = 0;
     if (!ascc_mpi_room(set, &set->loads, rows, sizeof(ascc_load)))
         return false;
     ascc_load *load = set->loads.at;
@@ -73,10 +85,11 @@ static bool find_loads(ascc_mpi_particles *set, size_t *count)
         find_place(set, i, place);
         ascc_curve_block(&set->curve, place, block);
         const uint64_t key = ascc_curve_key(&set->curve, block);
-        if (*count == 0 || load[*count - 1].key != key)
-            load[(*count)++] = (ascc_load){key, 0};
-        load[*count - 1].count++;
+        if (found == 0 || load[found - 1].key != key)
+            load[found++] = (ascc_load){key, 0};
+        load[found - 1].cost += each;
     }
+    *count = ascc_loads_join(load, found);
     return true;
 }
 
@@ -87,48 +100,43 @@ static ascc_status no_memory(ascc_mpi_particles *set)
 }
 
 /* Everybody has the loads of all, and cuts the curve alike. */
-static ascc_status cut(ascc_mpi_particles *set)
+static ascc_status cut(ascc_mpi_particles *set, double limit)
 {
-    const size_t ranks = (size_t)set->size;
-    size_t count, all;
+    size_t count = 0, all;
     ascc_status status = ascc_mpi_agree(set, find_loads(set, &count) ? ASCC_OK : no_memory(set));
-    if (status != ASCC_OK)
-        return status;
-    for (size_t r = 0; r < ranks; r++)
-        set->counts[r] = count;
-    status = ascc_mpi_room(set, &set->outgoing, ranks * count * sizeof(ascc_load), 1)
-                 ? ASCC_OK
-                 : no_memory(set);
-    for (size_t r = 0; r < ranks && status == ASCC_OK; r++)
-        memcpy((unsigned char *)set->outgoing.at + r * count * sizeof(ascc_load), set->loads.at,
-               count * sizeof(ascc_load));
-    status = ascc_mpi_agree(set, status);
     if (status == ASCC_OK)
-        status = ascc_mpi_swap(set, sizeof(ascc_load), &all);
+        status = ascc_mpi_share(set, set->loads.at, count, sizeof(ascc_load), &all);
     if (status != ASCC_OK)
         return status;
-    size_t at = 0;
-    for (size_t r = 0; r < (size_t)set->rank; r++)
-        at += set->counts[ranks + r];
-    memcpy((ascc_load *)set->incoming.at + at, set->loads.at, count * sizeof(ascc_load));
-    ascc_curve_cut(&set->curve, set->incoming.at, all);
+    ascc_load *load = set->incoming.at;
+    ascc_curve_cut(&set->curve, load, ascc_loads_join(load, all), limit);
     set->owners.known = false;
     set->cut = true;
     return ASCC_OK;
 }
 
+/* Has so much fluid come or gone that what was known of the balance is no use? */
+static bool is_other_fluid(const ascc_mpi_particles *set)
+{
+    const double before = (double)set->total, now = (double)set->halo.total;
+    return fabs(now - before) > OTHER * before;
+}
+
 static ascc_status balance(ascc_mpi_particles *set)
 {
-    uint64_t most = set->local->fluid_count;
-    if (set->cut && ++set->age < LOOK)
+    const bool anew = !set->cut || is_other_fluid(set);
+    uint64_t most = cost_of(set), total = most;
+    if (!anew && ++set->age < LOOK)
         return ASCC_OK;
     set->age = 0;
+    set->total = set->halo.total;
     set->halo.reached = fmax(ASCC_MPI_SPARE * set->farthest, ASCC_MPI_NEAR * set->local->spacing);
     set->farthest = 0.0;
     ascc_mpi_reduce(set, &most, 1, MPI_UINT64_T, MPI_MAX);
-    if (set->cut && (double)most * set->size <= UNEVEN * (double)set->halo.total + set->size)
+    ascc_mpi_reduce(set, &total, 1, MPI_UINT64_T, MPI_SUM);
+    if (!anew && (double)most * set->size <= UNEVEN * (double)total)
         return ASCC_OK;
-    return cut(set);
+    return cut(set, anew ? set->size : FARTHEST);
 }
 
 /* ---- Owners ---- */
@@ -301,5 +309,6 @@ void ascc_mpi_ghosts_end(ascc_halo *halo, ascc_particles *particles)
 {
     ascc_mpi_particles *set = ascc_mpi_of_halo(halo);
     particles->fluid_count = halo->own;
+    set->neighbors = set->step->statistics.neighbor_count;
     set->motion = NULL;
 }

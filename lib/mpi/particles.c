@@ -27,6 +27,8 @@ static bool open_lists(ascc_mpi_particles *set)
     set->counts = ascc_allocate(a, 4 * size, sizeof *set->counts);
     set->told = ascc_allocate(a, 2 * size, sizeof *set->told);
     set->curve.first = ascc_allocate(a, size, sizeof *set->curve.first);
+    set->curve.cut = ascc_allocate(a, size, sizeof *set->curve.cut);
+    set->parts = ascc_allocate(a, 2 * size, sizeof *set->parts);
     set->owners.rank = ascc_allocate(a, size, sizeof *set->owners.rank);
     set->owners.is = ascc_allocate(a, size, 1);
     for (int l = 0; l < ASCC_MAX_LEVELS; l++) {
@@ -38,8 +40,8 @@ static bool open_lists(ascc_mpi_particles *set)
     }
     for (size_t r = 0; set->curve.first && r < size; r++)
         set->curve.first[r] = r == 0 ? 0 : UINT64_MAX;
-    return room && set->counts && set->told && set->curve.first && set->owners.rank &&
-           set->owners.is;
+    return room && set->counts && set->told && set->curve.first && set->curve.cut && set->parts &&
+           set->owners.rank && set->owners.is;
 }
 
 static void close_lists(ascc_mpi_particles *set)
@@ -64,6 +66,10 @@ static void close_lists(ascc_mpi_particles *set)
         ascc_release(a, set->told, 2 * size, sizeof *set->told);
     if (set->curve.first)
         ascc_release(a, set->curve.first, size, sizeof *set->curve.first);
+    if (set->curve.cut)
+        ascc_release(a, set->curve.cut, size, sizeof *set->curve.cut);
+    if (set->parts)
+        ascc_release(a, set->parts, 2 * size, sizeof *set->parts);
     if (set->owners.rank)
         ascc_release(a, set->owners.rank, size, sizeof *set->owners.rank);
     if (set->owners.is)
@@ -222,24 +228,11 @@ static int by_value(const void *a, const void *b)
 static ascc_status collect_ids(ascc_mpi_particles *set, size_t count, const uint64_t *ids,
                                size_t *all)
 {
-    const size_t ranks = (size_t)set->size;
-    bool room = ascc_mpi_room(set, &set->outgoing, ranks * count * 8, 1);
-    for (size_t r = 0; r < ranks; r++) {
-        set->counts[r] = count;
-        if (room && count)
-            memcpy((uint64_t *)set->outgoing.at + r * count, ids, count * sizeof *ids);
-    }
-    ascc_status status = ascc_mpi_agree(set, room ? ASCC_OK : ASCC_ERROR_MEMORY);
-    if (status == ASCC_OK)
-        status = ascc_mpi_swap(set, sizeof *ids, all);
+    const ascc_status status = ascc_mpi_share(set, ids, count, sizeof *ids, all);
     if (status != ASCC_OK)
-        return set->by_other ? ASCC_OK : ASCC_ERROR_MEMORY;
-    size_t at = 0;
-    for (int r = 0; r < set->rank; r++)
-        at += set->counts[ranks + (size_t)r];
-    if (count)
-        memcpy((uint64_t *)set->incoming.at + at, ids, count * sizeof *ids);
-    qsort(set->incoming.at, *all, sizeof *ids, by_value);
+        return set->by_other ? ASCC_OK : status;
+    if (*all)
+        qsort(set->incoming.at, *all, sizeof *ids, by_value);
     return ASCC_OK;
 }
 

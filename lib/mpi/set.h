@@ -44,6 +44,8 @@ struct ascc_mpi_particles {
     ascc_owners owners;
     bool cut;                                /* the curve is cut by what fluid there is */
     double farthest;                         /* that fluid has gone since then, host's unit */
+    size_t total;                            /* fluid of all then */
+    uint64_t neighbors;                      /* of fluid of this process in the last step */
     uint64_t age;                            /* steps since the last look at the balance */
     ascc_mpi_ghosts ghosts[ASCC_MAX_LEVELS]; /* fluid, then levels by number */
     double reach[ASCC_MAX_LEVELS];           /* host's unit: how far a row of the set is read */
@@ -52,6 +54,7 @@ struct ascc_mpi_particles {
     size_t kept_size;
     size_t *counts; /* [4][size] */
     uint64_t *told; /* [2][size] */
+    int *parts;     /* [2][size] */
     /* Of the step under way: */
     struct ascc_step *step;
     const ascc_motion *motion;
@@ -106,6 +109,9 @@ bool ascc_mpi_sort_pairs(ascc_mpi_particles *set, const ascc_mpi_pair *pair, siz
 /* Rows of `size` bytes that were packed into set->outgoing by process, count[0][rank] of them, arrive in set->incoming,
  * count[1][rank] of them. errors: those of any process. */
 ascc_status ascc_mpi_swap(ascc_mpi_particles *set, size_t size, size_t *received);
+/* Rows of all processes in set->incoming, one after another. errors: those of any process. */
+ascc_status ascc_mpi_share(ascc_mpi_particles *set, const void *rows, size_t count, size_t size,
+                           size_t *all);
 ascc_status ascc_mpi_refresh(ascc_halo *halo, int set, const uint32_t *row,
                              const ascc_halo_rows *arrays, size_t count);
 
