@@ -980,6 +980,36 @@ static void a_hyperviscosity_never_adds_energy(void **state)
     assert_true(least < 0.7);
 }
 
+/* The hash of a crowd after a step of a model of one gravity under another. */
+static uint64_t hash_under(int d, double own, double gravity, const char *more)
+{
+    static double x[200 * 3], v[200 * 3], m[200];
+    const double g[3] = {0.0, -gravity, 0.0};
+    const ascc_forces forces = {.size = sizeof forces, .gravity = g};
+    world w;
+    dice r = {50};
+    open_pbf(&w, d, own, 2, more);
+    add_fluid(&w, crowd(&r, d, 150, 1.0, x, v, m, false), x, v, m);
+    check_good(&w, ascc_step_run(w.step, w.particles, &forces, 1));
+    check_conserved(&w);
+    const uint64_t hash = ascc_particles_hash(w.particles);
+    close_world(&w);
+    return hash;
+}
+
+static void a_viscosity_goes_with_gravity_and_is_none_without(void **state)
+{
+    (void)state;
+    for (int d = 2; d <= 3; d++) {
+        const uint64_t none = hash_under(d, -8.0, 0.0, "");
+        const uint64_t half = hash_under(d, -8.0, 4.0, viscosity_text("0.5", 2.0));
+        assert_true(hash_under(d, -8.0, 0.0, viscosity_text("0.5", 10.0)) == none);
+        assert_true(half == hash_under(d, -4.0, 4.0, viscosity_text("0.5", 1.0)));
+        assert_true(half != hash_under(d, -4.0, 4.0, viscosity_text("0.5", 2.0)));
+        assert_true(half != hash_under(d, -8.0, 4.0, ""));
+    }
+}
+
 static void water_that_moves_as_one_and_splashes_have_no_viscosity(void **state)
 {
     (void)state;
@@ -1210,6 +1240,7 @@ int main(void)
         cmocka_unit_test(scenes_of_any_density_end_in_bounded_corrections),
         cmocka_unit_test(a_hyperviscosity_never_adds_energy),
         cmocka_unit_test(water_that_moves_as_one_and_splashes_have_no_viscosity),
+        cmocka_unit_test(a_viscosity_goes_with_gravity_and_is_none_without),
         cmocka_unit_test(rough_motion_ends_and_smooth_motion_stays),
         cmocka_unit_test(bad_constants_are_refused_by_name),
         cmocka_unit_test(a_network_without_output_needs_a_relaxation),

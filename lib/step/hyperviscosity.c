@@ -3,7 +3,7 @@
  * With w_ij = min(s_i, s_j) |g_ij|^2, s_i = 1 / max(sum_j |g_ij|^2, D_lattice), 0 at free surfaces, and masses 1:
  *
  *     R_i = sum_j w_ij (v_i - v_j)                      how much rougher v_i is than those around it
- *     R_i = R_i max(0, 1 - |R_i|^2 / below^2)^2         a splash is left alone
+ *     R_i = R_i max(0, 1 - |R_i|^2 / below^2)^2         a splash is left alone, and all where nothing falls
  *     v_i = v_i - share sum_j w_ij (R_i - R_j)
  *
  * The matrix of the first line, A, is symmetric with eigenvalues in [0, 2], and the second line is a diagonal F in
@@ -66,10 +66,25 @@ double ascc_smoothing_share(const ascc_step_state *state, double share)
     return share * (steps < 1.0 ? steps : 1.0);
 }
 
+static double length_of(const double v[3])
+{
+    return sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
+}
+
 float ascc_smoothing_bound(const ascc_step_state *state)
 {
-    const ascc_relaxation *r = &state->network->plan->relaxation;
-    return (float)(r->viscosity_below * state->motion->time_step * state->time_unit / r->support);
+    const ascc_plan *plan = state->network->plan;
+    const double trained = length_of(plan->gravity), unit = state->time_unit;
+    const double gravity = length_of(state->motion->gravity) * state->length_unit / (unit * unit);
+    const double below =
+        plan->relaxation.viscosity_below * (trained > 0.0 ? gravity / trained : 1.0);
+    return (float)(below * state->motion->time_step * unit / plan->relaxation.support);
+}
+
+int32_t ascc_smoothing_sweeps(const ascc_step_state *state)
+{
+    return ascc_smoothing_bound(state) > 0.0f ? state->network->plan->relaxation.viscosity.count
+                                              : 0;
 }
 
 /* Of all fluid, that of other processes, too. */
@@ -212,7 +227,7 @@ static bool keep_sweeps(const ascc_smoothing *s, int32_t sweeps)
 ascc_status ascc_smooth_velocities(const ascc_smoothing *s)
 {
     ascc_arena *arena = s->state->tools.arena;
-    const int32_t sweeps = s->state->network->plan->relaxation.viscosity.count;
+    const int32_t sweeps = ascc_smoothing_sweeps(s->state);
     sweep w = {.of = s,
                .bound = ascc_smoothing_bound(s->state),
                .velocity = ascc_arena_lend(arena, s->count, 4 * sizeof *w.velocity),

@@ -23,8 +23,10 @@ ascc_status ascc_smooth_velocities(const ascc_smoothing *smoothing);
 
 /* A sweep takes no more than this share in a step of that length: by the model's own, if it is shorter. */
 double ascc_smoothing_share(const ascc_step_state *state, double share);
-/* Roughness that is left alone, supports a step. */
+/* Roughness that is left alone, supports a step: the model's own, by the share that the step's gravity is of the model's. */
 float ascc_smoothing_bound(const ascc_step_state *state);
+/* None where nothing falls: there is no rest to come to, and a drop keeps turning. */
+int32_t ascc_smoothing_sweeps(const ascc_step_state *state);
 
 /* The velocity of a row as it is now, in supports a step; 0 if it has no turn of its own. */
 void ascc_relaxation_velocity(const ascc_step_state *state, size_t row, float velocity[4]);

@@ -134,7 +134,7 @@ ascc_status ascc_smoothing_backward(const ascc_step_state *state, ascc_arena *ar
     if (!r.z || !r.w || !r.back || !r.faded)
         return ASCC_ERROR_MEMORY;
     memset(r.by_square, 0, ascc_smoothing_pairs(trace, count) * sizeof *r.by_square);
-    for (int32_t k = state->network->plan->relaxation.viscosity.count; k > 0; k--)
+    for (int32_t k = ascc_smoothing_sweeps(state); k > 0; k--)
         sweep_back(&r, k - 1, gradients->velocity);
     coefficients_back(&r, gradients->by_squares);
     return ASCC_OK;

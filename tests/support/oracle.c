@@ -1040,7 +1040,7 @@ static void relax(const network_state *n, const double *before, double *position
     for (size_t i = 0; value && i < o->fluid_count; i++)
         guess[i] = read_value(n, value, true, i, 0);
     relaxation_oracle(&o->model->plan, o->fluid_count, o->wall_count, o->wall, before,
-                      value ? guess : NULL, position, velocity);
+                      value ? guess : NULL, o->gravity, position, velocity);
     free(guess);
 }
 

@@ -173,7 +173,18 @@ static void roughness(const scene *s, const double coefficient[MOST], double vel
     }
 }
 
-static void smooth_velocities(const scene *s, double step, double *velocity)
+/* A viscosity's bound goes with the step's gravity, of a model that has one. */
+static double bound_under(const ascc_plan *plan, const double gravity[3])
+{
+    double own = 0.0, here = 0.0;
+    for (size_t c = 0; c < 3; c++) {
+        own = hypot(own, plan->gravity[c]);
+        here = hypot(here, gravity[c]);
+    }
+    return plan->relaxation.viscosity_below * (own > 0.0 ? here / own : 1.0);
+}
+
+static void smooth_velocities(const scene *s, double step, double below, double *velocity)
 {
     const ascc_relaxation *r = s->constants;
     double coefficient[MOST] = {0.0}, v[MOST][3] = {{0.0}}, rough[MOST][3], twice[MOST][3];
@@ -193,7 +204,7 @@ static void smooth_velocities(const scene *s, double step, double *velocity)
             double square = 0.0;
             for (size_t c = 0; c < 3; c++)
                 square += rough[i][c] * rough[i][c];
-            const double left = fmax(0.0, 1.0 - square / pow(r->viscosity_below * step, 2.0));
+            const double left = fmax(0.0, 1.0 - square / pow(below * step, 2.0));
             for (size_t c = 0; c < 3; c++)
                 rough[i][c] *= left * left;
         }
@@ -208,8 +219,8 @@ static void smooth_velocities(const scene *s, double step, double *velocity)
 }
 
 void relaxation_oracle(const ascc_plan *plan, size_t fluid, size_t walls, const double *wall,
-                       const double *before, const double *guess, double *position,
-                       double *velocity)
+                       const double *before, const double *guess, const double gravity[3],
+                       double *position, double *velocity)
 {
     const ascc_relaxation *r = &plan->relaxation;
     const double step = plan->time_step / r->support;
@@ -258,6 +269,6 @@ void relaxation_oracle(const ascc_plan *plan, size_t fluid, size_t walls, const 
     if (r->divergence.count)
         relax_velocities(s, step, velocity);
     if (r->viscosity.count)
-        smooth_velocities(s, step, velocity);
+        smooth_velocities(s, step, bound_under(plan, gravity), velocity);
     free(s);
 }

@@ -6,10 +6,10 @@
 #include "model/plan.h"
 
 /* What a model's relaxation makes of positions and velocities [fluid][dimension] that the network left;
- * `before` are the positions that the step began with; guess, [fluid] or NULL,
- * is the value that pressures begin with. Without contact. */
+ * `before` are the positions that the step began with, gravity that of the step; guess, [fluid] or NULL, is the
+ * value that pressures begin with. Without contact. */
 void relaxation_oracle(const ascc_plan *plan, size_t fluid, size_t walls, const double *wall,
-                       const double *before, const double *guess, double *position,
-                       double *velocity);
+                       const double *before, const double *guess, const double gravity[3],
+                       double *position, double *velocity);
 
 #endif
