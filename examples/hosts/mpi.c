@@ -12,7 +12,6 @@
 #include <ascc/mpi.h>
 
 enum { COLUMNS = 24, ROWS = 36, DEEP = 8 };
-
 static int rank, size;
 
 /* The library returns the same status on all processes: one of them tells, all end. */
