@@ -241,6 +241,7 @@ refuses 1 'nowhere.safetensors' trust nowhere.safetensors a.safetensors -o t.saf
 holds 'refused statistics leave no file' test ! -e t.safetensors
 run generate wbc2d -o g --seed 4 --count 1 --frames 8 --spacing 0.0125 --solver sph
 run trust water2d.safetensors g/wbc2d_4_0000.safetensors -o t.safetensors --frames 4 --threshold 3.5
+refuses 1 'a 3D model cannot learn from 2D' trust "$root/examples/models/water3d.safetensors" g/wbc2d_4_0000.safetensors -o t.safetensors
 holds 'statistics of given sequences are in the file' sh -c '"$0" info t.safetensors | grep -q "errors double at 3.5"' "$ascc"
 refuses 2 '--sleep takes a number from 0' sim demo dam-break-2d -n 1 --sleep -1
 refuses 2 '--budget takes a --ladder' sim demo dam-break-2d -n 1 --budget 4

@@ -28,6 +28,7 @@
 #include "tensor_file.h"
 #include "train_config.h"
 #include "train_log.h"
+#include "training_sequence.h"
 #include "system.h"
 
 typedef struct training {
@@ -116,34 +117,15 @@ static bool write_model(training *t, const char *path)
 static bool add_sequence(training *t, const ascc_train_source *source)
 {
     ascc_sequence s;
+    ascc_training_sequence given;
     char why[256];
-    const size_t every = (size_t)source->every;
-    if (!ascc_sequence_read(source->path, &s, why, sizeof why))
+    if (!ascc_training_sequence_read(source->path, (size_t)source->every, &s, &given, why,
+                                     sizeof why))
         return fail(t, "train", why);
-    const size_t frames = ascc_thin_frames(
-        s.position, s.count * (size_t)s.dimension * sizeof *s.position, s.frames, every);
-    const size_t walls = s.walls * (size_t)s.dimension * sizeof *s.wall;
-    if (s.walls_move) {
-        (void)ascc_thin_frames(s.wall, walls, s.frames, every);
-        (void)ascc_thin_frames(s.normal, walls, s.frames, every);
-    }
-    const ascc_training_sequence sequence = {.size = sizeof sequence,
-                                             .name = ascc_system_name(source->path),
-                                             .frame_count = frames,
-                                             .fluid_count = s.count,
-                                             .boundary_count = s.walls,
-                                             .position = s.position,
-                                             .boundary_position = s.wall,
-                                             .boundary_normal = s.normal,
-                                             .time_step = s.time_step * source->every,
-                                             .gravity = {s.gravity[0], s.gravity[1], s.gravity[2]},
-                                             .share = source->share,
-                                             .warm_up = source->warm_up,
-                                             .jitter = source->jitter,
-                                             .spacing = 2.0 * s.radius,
-                                             .boundary_moves = s.walls_move,
-                                             .dimension = s.dimension};
-    const ascc_status status = ascc_trainer_add_sequence(t->trainer, &sequence);
+    given.share = source->share;
+    given.warm_up = source->warm_up;
+    given.jitter = source->jitter;
+    const ascc_status status = ascc_trainer_add_sequence(t->trainer, &given);
     ascc_sequence_free(&s);
     return status == ASCC_OK || fail(t, source->path, ascc_trainer_message(t->trainer));
 }

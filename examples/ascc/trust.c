@@ -21,6 +21,7 @@
 #include "sequence.h"
 #include "system.h"
 #include "tensor_file.h"
+#include "training_sequence.h"
 
 enum { MOST_SEQUENCES = 1024, FRAMES = 400 };
 
@@ -95,28 +96,10 @@ static bool failed(trust *t, const char *what, const char *why)
 static bool add_sequence(trust *t, const char *path)
 {
     ascc_sequence s;
+    ascc_training_sequence given;
     char why[256];
-    if (!ascc_sequence_read(path, &s, why, sizeof why))
+    if (!ascc_training_sequence_read(path, t->every, &s, &given, why, sizeof why))
         return failed(t, "sequence", why);
-    const size_t walls = s.walls * (size_t)s.dimension * sizeof *s.wall;
-    const size_t frames = ascc_thin_frames(
-        s.position, s.count * (size_t)s.dimension * sizeof *s.position, s.frames, t->every);
-    if (s.walls_move) {
-        (void)ascc_thin_frames(s.wall, walls, s.frames, t->every);
-        (void)ascc_thin_frames(s.normal, walls, s.frames, t->every);
-    }
-    const ascc_training_sequence given = {.size = sizeof given,
-                                          .name = ascc_system_name(path),
-                                          .frame_count = frames,
-                                          .fluid_count = s.count,
-                                          .boundary_count = s.walls,
-                                          .position = s.position,
-                                          .boundary_position = s.wall,
-                                          .boundary_normal = s.normal,
-                                          .time_step = s.time_step * (double)t->every,
-                                          .gravity = {s.gravity[0], s.gravity[1], s.gravity[2]},
-                                          .spacing = 2.0 * s.radius,
-                                          .boundary_moves = s.walls_move};
     const ascc_status status = ascc_trainer_add_sequence(t->trainer, &given);
     ascc_sequence_free(&s);
     return status == ASCC_OK || failed(t, path, ascc_trainer_message(t->trainer));
