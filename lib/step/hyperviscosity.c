@@ -66,16 +66,12 @@ double ascc_smoothing_share(const ascc_step_state *state, double share)
     return share * (steps < 1.0 ? steps : 1.0);
 }
 
-static double length_of(const double v[3])
-{
-    return sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
-}
-
 float ascc_smoothing_bound(const ascc_step_state *state)
 {
     const ascc_plan *plan = state->network->plan;
-    const double trained = length_of(plan->gravity), unit = state->time_unit;
-    const double gravity = length_of(state->motion->gravity) * state->length_unit / (unit * unit);
+    const double trained = ascc_vector_length(plan->gravity), unit = state->time_unit;
+    const double gravity =
+        ascc_vector_length(state->motion->gravity) * state->length_unit / (unit * unit);
     const double below =
         plan->relaxation.viscosity_below * (trained > 0.0 ? gravity / trained : 1.0);
     return (float)(below * state->motion->time_step * unit / plan->relaxation.support);

@@ -224,11 +224,6 @@ static int32_t code_of(const ascc_step_state *state)
     return -1 - (int32_t)(hash & 0x3fffffff);
 }
 
-static double length_of(const double v[3])
-{
-    return sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
-}
-
 static ascc_status no_memory(const ascc_step_state *state)
 {
     return ascc_fail(state->tools.message, ASCC_ERROR_MEMORY, "no memory for the sleeping fluid");
@@ -308,7 +303,7 @@ static ascc_status wake_all(ascc_step_state *state)
 ascc_status ascc_stage_sleep(ascc_step_state *state)
 {
     const size_t n = state->particles->fluid_count;
-    const double fall = state->motion->time_step * length_of(state->motion->gravity);
+    const double fall = state->motion->time_step * ascc_vector_length(state->motion->gravity);
     if (state->halo) /* ghosts are idle: what they do is computed elsewhere */
         state->sleep.idle = state->halo->ghost;
     if (state->halo || !(state->motion->sleep_speed * fall > 0.0) || n == 0)

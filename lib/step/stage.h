@@ -7,6 +7,8 @@
 #ifndef ASCC_STAGE_H
 #define ASCC_STAGE_H
 
+#include <math.h>
+
 #include "network/pair_sum.h"
 #include "points/particles.h"
 #include "turn.h"
@@ -21,6 +23,11 @@ typedef struct ascc_motion {
     double max_displacement; /* 0 = none */
     double sleep_speed;      /* in what gravity gives in a step; 0 = nothing sleeps */
 } ascc_motion;
+
+static inline double ascc_vector_length(const double v[3])
+{
+    return sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
+}
 
 /* One step's state while it is not yet the particles' own. All [fluid count][dimension]. */
 typedef struct ascc_advance {
