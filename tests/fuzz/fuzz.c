@@ -194,8 +194,9 @@ void fuzz_step_model(ascc_context *context, const ascc_model *model)
                                             .spacing = info.particle_spacing,
                                             .mass = 0.125};
     ascc_status status = ascc_particles_create(context, &options, &particles);
+    const ascc_step_options measured = {.size = sizeof measured, .measure_distance = 1};
     if (status == ASCC_OK)
-        status = ascc_step_create(context, model, NULL, &step);
+        status = ascc_step_create(context, model, &measured, &step);
     (void)ascc_context_message(context, text, sizeof text);
     fuzz_named(status, text);
     if (status == ASCC_OK) {

@@ -12,6 +12,7 @@
  *   'g'  that of a graph network
  *   'd'  the architecture of a published DMCF network, likewise
  *   'c'  that of a published CConv network
+ *   't'  the statistics of training of a network's file
  */
 #include <stdlib.h>
 #include <string.h>
@@ -155,6 +156,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     case 'g':
     case 'd':
     case 'c':
+    case 't':
         load_text(data + 1, size - 1, (char)data[0]);
         break;
     default:

@@ -77,7 +77,7 @@ static void write_models(void)
         "{\"\\ud83d\\ude00\\u00e9\\n\":[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[]",
         "{\"a\":[1e308,-0.1e-320,123456789012345678901234567890,5e-324,true,false,null]}",
     };
-    static const char kinds[] = {'n', 'b', 'p', 'g', 'd', 'c'};
+    static const char kinds[] = {'n', 'b', 'p', 'g', 'd', 'c', 't'};
     const model_random tiny = {.channels = 4, .cells = 1, .output_cells = 2, .trunk_layers = 1};
     const model_random farthest = {.levels = 2,
                                    .channels = 4,

@@ -5,6 +5,7 @@
 
 #include <math.h>
 #include <stdarg.h>
+#include <inttypes.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -766,6 +767,8 @@ static unsigned char *random_file(const model_random *options, const char *netwo
     model_builder_metadata(&n.builder, "format", "ascc.model");
     model_builder_metadata(&n.builder, "version", "1");
     model_builder_metadata(&n.builder, "network", network ? network : n.text.text);
+    if (o->trust)
+        model_builder_metadata(&n.builder, "trust", o->trust);
     if (described)
         *described = n.text.text;
     else
@@ -983,6 +986,9 @@ static const model_random small_hourglass = {.levels = 2,
 static const model_random small_graph = {
     .channels = 4, .graph = 1, .history = 2, .plain = 1, .radius = 1.45};
 
+static const model_random small_trusted = {
+    .channels = 4, .bumps = 2, .fluid_only = 1, .trunk_layers = 1, .motion = 1};
+
 static const model_random *small_of(char kind)
 {
     return kind == 'b'   ? &small_basis
@@ -991,10 +997,49 @@ static const model_random *small_of(char kind)
                          : &small;
 }
 
+static unsigned char *trusted_file(const char *trust, size_t *size)
+{
+    model_random o = small_trusted;
+    o.trust = trust;
+    return random_file(&o, NULL, NULL, size);
+}
+
+/* FNV-1a of a file's tensors, which are all that follows its header. */
+static uint64_t sum_of_tensors(const unsigned char *bytes, size_t size)
+{
+    uint64_t length = 0, sum = UINT64_C(0xcbf29ce484222325);
+    for (int k = 7; k >= 0; k--)
+        length = length << 8 | bytes[k];
+    for (size_t i = 8 + (size_t)length; i < size; i++)
+        sum = (sum ^ bytes[i]) * UINT64_C(0x100000001b3);
+    return sum;
+}
+
+/* Statistics of the first layer that any numbers may be. */
+static char *trusted_description(void)
+{
+    size_t size;
+    model_text text = {NULL, 0, 0};
+    unsigned char *bytes = trusted_file(NULL, &size);
+    model_text_add(&text,
+                   "{\"layer\":0,\"weights\":\"%016" PRIx64 "\",\"threshold\":1.5,\"mean\":[0.1",
+                   sum_of_tensors(bytes, size));
+    free(bytes);
+    for (int c = 1; c < small_trusted.channels; c++)
+        model_text_add(&text, ",%s", model_number(0.1 - 0.05 * c));
+    model_text_add(&text, "],\"factor\":[");
+    for (int i = 0; i < small_trusted.channels; i++)
+        for (int j = 0; j <= i; j++)
+            model_text_add(&text, "%s%s", i ? "," : "", model_number(i == j ? 2.0 : -0.25 * j));
+    model_text_add(&text, "]}");
+    return text.text;
+}
+
 unsigned char *model_builder_described(char kind, const char *text, size_t *size)
 {
     return kind == 'd'   ? model_builder_dmcf(dmcf_architecture, text, size)
            : kind == 'c' ? model_builder_cconv(cconv_architecture, text, size)
+           : kind == 't' ? trusted_file(text, size)
                          : random_file(small_of(kind), text, NULL, size);
 }
 
@@ -1002,6 +1047,8 @@ char *model_builder_description(char kind)
 {
     model_text text = {NULL, 0, 0};
     size_t size;
+    if (kind == 't')
+        return trusted_description();
     if (kind != 'd' && kind != 'c') {
         free(random_file(small_of(kind), NULL, &text.text, &size));
         return text.text;

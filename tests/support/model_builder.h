@@ -95,6 +95,7 @@ typedef struct model_random {
     int guess;   /* 1: a layer "guess" of one channel for the relaxation */
     const char *relaxation; /* JSON object; NULL = none */
     int direction; /* 1: the last layer's pairs act along their present line; bumps, fluid_only */
+    const char *trust;    /* statistics of its training, JSON; NULL = none */
     const char *residual; /* type and members of a layer's residual; NULL = identity */
 } model_random;
 
@@ -113,8 +114,8 @@ unsigned char *model_builder_dmcf(const char *from, const char *to, size_t *size
 unsigned char *model_builder_cconv(const char *from, const char *to, size_t *size);
 
 /* For fuzzing: a file with the tensors of a small network and another description of it. kind 'n':
- * own format, two levels; 'b': the same in a basis; 'p': set abstractions; 'g': a graph network; 'd', 'c': published. model_builder_description gives the right one, which
- * is the caller's to free. */
+ * own format, two levels; 'b': the same in a basis; 'p': set abstractions; 'g': a graph network; 'd', 'c': published; 't': the text is the statistics of a network's training.
+ * model_builder_description gives the right one, which is the caller's to free. */
 unsigned char *model_builder_described(char kind, const char *text, size_t *size);
 char *model_builder_description(char kind);
 
