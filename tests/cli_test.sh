@@ -239,6 +239,13 @@ refuses 2 'a MODEL, a SEQUENCE and -o are wanted' trust water2d.safetensors -o t
 refuses 2 'unknown option: --frame' trust water2d.safetensors a.safetensors --frame 3
 refuses 1 'nowhere.safetensors' trust nowhere.safetensors a.safetensors -o t.safetensors
 holds 'refused statistics leave no file' test ! -e t.safetensors
+run generate wbc2d -o fine --seed 1 --count 3 --frames 1 --spacing 0.005
+of_paper_size() {
+    for n in 0 1 2; do
+        "$ascc" info fine/wbc2d_1_000$n.safetensors | awk '/fluid particles/ { n = $3 + 0 } END { exit n < 6000 || n > 12000 }' || return 1
+    done
+}
+holds 'scenes of 0.005 m are of the paper'"'"'s size, some 10,000 particles' of_paper_size
 run generate wbc2d -o g --seed 4 --count 1 --frames 8 --spacing 0.0125 --solver sph
 run trust water2d.safetensors g/wbc2d_4_0000.safetensors -o t.safetensors --frames 4 --threshold 3.5
 refuses 1 'a 3D model cannot learn from 2D' trust "$root/examples/models/water3d.safetensors" g/wbc2d_4_0000.safetensors -o t.safetensors

@@ -42,11 +42,28 @@ static const model_random plain = {.seed = 14,
                                    .mapping = "identity",
                                    .plain = 1,
                                    .skip_self = 1};
+static const model_random graph = {.seed = 15,
+                                   .dimension = 2,
+                                   .channels = 16,
+                                   .spacing = 0.05,
+                                   .radius = 1.45,
+                                   .graph = 3,
+                                   .history = 5,
+                                   .plain = 1};
+static const model_random abstraction = {.seed = 16,
+                                         .dimension = 3,
+                                         .levels = 2,
+                                         .channels = 16,
+                                         .spacing = 0.05,
+                                         .method = "farthest",
+                                         .abstraction = 1 + 2 + 32,
+                                         .plain = 1};
 
 static const scene scenes[] = {
     {"dam-2d", 2, 12, 60, NULL},    {"dam-3d", 3, 5, 20, NULL},
     {"random-2d", 2, 8, 4, &flat},  {"farthest-2d", 2, 8, 4, &farthest},
     {"random-3d", 3, 4, 3, &solid}, {"plain-3d", 3, 4, 3, &plain},
+    {"graph-2d", 2, 8, 6, &graph},  {"abstraction-3d", 3, 4, 3, &abstraction},
 };
 
 static void check(ascc_status status, const char *what)

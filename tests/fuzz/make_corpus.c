@@ -88,6 +88,8 @@ static void write_models(void)
                                    .plain = 1};
     const model_random graph = {
         .channels = 4, .graph = 1, .history = 2, .plain = 1, .radius = 1.45};
+    const model_random abstraction = {
+        .channels = 4, .levels = 2, .method = "farthest", .abstraction = 1 + 2 + 16, .plain = 1};
     for (int i = 0; i < 2; i++) {
         const char kind = "fh"[i];
         char name[32];
@@ -100,6 +102,9 @@ static void write_models(void)
         write_file("model", name, kind, bytes, size);
         bytes = model_builder_random(&graph, &size);
         snprintf(name, sizeof name, "graph-%c", kind);
+        write_file("model", name, kind, bytes, size);
+        bytes = model_builder_random(&abstraction, &size);
+        snprintf(name, sizeof name, "abstraction-%c", kind);
         write_file("model", name, kind, bytes, size);
         bytes = model_builder_cconv(NULL, NULL, &size);
         snprintf(name, sizeof name, "cconv-%c", kind);
