@@ -26,6 +26,17 @@ static uint64_t spread(uint64_t x)
     return (x | x << 2) & UINT64_C(0x1249249249249249);
 }
 
+/* And back: every third of 63 bits. */
+static uint64_t join(uint64_t x)
+{
+    x &= UINT64_C(0x1249249249249249);
+    x = (x | x >> 2) & UINT64_C(0x10c30c30c30c30c3);
+    x = (x | x >> 4) & UINT64_C(0x100f00f00f00f00f);
+    x = (x | x >> 8) & UINT64_C(0x001f0000ff0000ff);
+    x = (x | x >> 16) & UINT64_C(0x001f00000000ffff);
+    return (x | x >> 32) & UINT64_C(0x00000000001fffff);
+}
+
 uint64_t ascc_curve_key(const ascc_curve *curve, const int64_t block[3])
 {
     uint64_t key = 0;
@@ -34,9 +45,23 @@ uint64_t ascc_curve_key(const ascc_curve *curve, const int64_t block[3])
     return key;
 }
 
+/* The key that decides who owns a block. */
+static uint64_t owning_key(const ascc_curve *curve, const int64_t block[3])
+{
+    int64_t at[3];
+    if (curve->blocks.count == 0)
+        return ascc_curve_key(curve, block);
+    for (int c = 0; c < 3; c++)
+        at[c] = block[c] < curve->low[c]    ? curve->low[c]
+                : block[c] > curve->high[c] ? curve->high[c]
+                                            : block[c];
+    const uint32_t known = ascc_blocks_find(&curve->blocks, at);
+    return known != ASCC_NO_BLOCK ? curve->key[known] : ascc_curve_key(curve, at);
+}
+
 int ascc_curve_owner(const ascc_curve *curve, const int64_t block[3])
 {
-    const uint64_t key = ascc_curve_key(curve, block);
+    const uint64_t key = owning_key(curve, block);
     int low = 0, high = curve->size; /* the owner is in [low, high) */
     while (high - low > 1) {
         const int middle = low + (high - low) / 2;
@@ -118,6 +143,111 @@ void ascc_owners_find(ascc_owners *owners, const ascc_curve *curve, const double
     find_in_box(owners, curve, from, to);
 }
 
+/* ---- Blocks beside fluid ---- */
+
+#define BESIDE 26
+
+/* The blocks that touch a block, those with a face in common first, then edges; how many. */
+static int find_beside(const ascc_curve *curve, const int64_t block[3], int64_t beside[BESIDE][3])
+{
+    const int64_t deep = curve->dimension == 3;
+    int count = 0;
+    for (int64_t far = 1; far <= curve->dimension; far++)
+        for (int64_t z = -deep; z <= deep; z++)
+            for (int64_t y = -1; y <= 1; y++)
+                for (int64_t x = -1; x <= 1; x++)
+                    if (x * x + y * y + z * z == far) {
+                        const int64_t at[3] = {block[0] + x, block[1] + y, block[2] + z};
+                        memcpy(beside[count++], at, sizeof at);
+                    }
+    return count;
+}
+
+static bool reserve(ascc_curve *curve, const ascc_allocator *allocator, size_t count)
+{
+    ascc_blocks *b = &curve->blocks;
+    const size_t slots = ascc_blocks_slots(count);
+    void *at = b->at, *slot = b->slot, *key = curve->key;
+    const bool room = ascc_grow(allocator, &at, &curve->block_capacity, count, sizeof *b->at) &
+                      ascc_grow(allocator, &slot, &curve->slot_capacity, slots, sizeof *b->slot) &
+                      ascc_grow(allocator, &key, &curve->key_capacity, count, sizeof *curve->key);
+    b->at = at;
+    b->slot = slot;
+    curve->key = key;
+    if (room)
+        ascc_blocks_open(b, at, slot, slots);
+    return room;
+}
+
+static void add_full(ascc_curve *curve, const ascc_load *load, size_t count)
+{
+    for (size_t i = 0; i < count; i++) {
+        int64_t at[3] = {0, 0, 0};
+        for (int c = 0; c < curve->dimension; c++) {
+            at[c] = (int64_t)join(load[i].key >> c) - HALF;
+            curve->low[c] = i && curve->low[c] < at[c] ? curve->low[c] : at[c];
+            curve->high[c] = i && curve->high[c] > at[c] ? curve->high[c] : at[c];
+        }
+        curve->key[ascc_blocks_add(&curve->blocks, at)] = load[i].key;
+    }
+}
+
+/* Adds a block without fluid: it has the owner of the first beside it that has some. */
+static void add_empty(ascc_curve *curve, const int64_t block[3], size_t full)
+{
+    int64_t beside[BESIDE][3];
+    const int count = find_beside(curve, block, beside);
+    for (int k = 0; k < count; k++) {
+        const uint32_t found = ascc_blocks_find(&curve->blocks, beside[k]);
+        if (found < full) {
+            curve->key[ascc_blocks_add(&curve->blocks, block)] = curve->key[found];
+            return;
+        }
+    }
+}
+
+bool ascc_curve_know(ascc_curve *curve, const ascc_allocator *allocator, const ascc_load *load,
+                     size_t count)
+{
+    int64_t beside[BESIDE][3];
+    ascc_curve_forget(curve);
+    if (count == 0)
+        return true;
+    if (count >= ASCC_NO_BLOCK / BESIDE || !reserve(curve, allocator, count))
+        return false;
+    add_full(curve, load, count);
+    size_t empty = 0; /* some are counted several times */
+    for (size_t i = 0; i < count; i++)
+        for (int k = find_beside(curve, curve->blocks.at[i], beside) - 1; k >= 0; k--)
+            empty += ascc_blocks_find(&curve->blocks, beside[k]) == ASCC_NO_BLOCK;
+    if (!reserve(curve, allocator, count + empty))
+        return false;
+    add_full(curve, load, count);
+    for (size_t i = 0; i < count; i++)
+        for (int k = find_beside(curve, curve->blocks.at[i], beside) - 1; k >= 0; k--)
+            if (ascc_blocks_find(&curve->blocks, beside[k]) == ASCC_NO_BLOCK)
+                add_empty(curve, beside[k], count);
+    return true;
+}
+
+void ascc_curve_forget(ascc_curve *curve)
+{
+    curve->blocks.count = 0;
+}
+
+void ascc_curve_release(ascc_curve *curve, const ascc_allocator *allocator)
+{
+    if (curve->blocks.at)
+        ascc_release(allocator, curve->blocks.at, curve->block_capacity, sizeof *curve->blocks.at);
+    if (curve->blocks.slot)
+        ascc_release(allocator, curve->blocks.slot, curve->slot_capacity,
+                     sizeof *curve->blocks.slot);
+    if (curve->key)
+        ascc_release(allocator, curve->key, curve->key_capacity, sizeof *curve->key);
+}
+
+/* ---- Balance ---- */
+
 static int by_key(const void *a, const void *b)
 {
     const ascc_load *x = a, *y = b;
@@ -147,6 +277,17 @@ static void find_cuts(const ascc_curve *curve, const ascc_load *load, size_t cou
             before += (double)load[i].cost;
         cut[rank] = before;
     }
+}
+
+double ascc_curve_most(ascc_curve *curve, const ascc_load *load, size_t count)
+{
+    double most = 0.0, total = 0.0;
+    for (size_t i = 0; i < count; i++)
+        total += (double)load[i].cost;
+    find_cuts(curve, load, count, curve->cut);
+    for (int r = 0; r < curve->size; r++)
+        most = fmax(most, (r + 1 < curve->size ? curve->cut[r + 1] : total) - curve->cut[r]);
+    return most;
 }
 
 void ascc_curve_cut(ascc_curve *curve, const ascc_load *load, size_t count, double limit)

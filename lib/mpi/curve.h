@@ -4,19 +4,26 @@
  *     key of a block (Morton order)   0 ......|............|.......|........ 2^63
  *     process                            0          1          2        3
  *
- * Every place has an owner, whether there is fluid or not, and all processes know it without a word.
+ * Every place has an owner, whether there is fluid or not, and all processes know it without a word. A block without
+ * fluid goes with one beside it that has some: where it lies on the curve says nothing of who has fluid near it.
  */
 #ifndef ASCC_CURVE_H
 #define ASCC_CURVE_H
 
-#include "base/common.h"
+#include "base/memory.h"
+#include "points/blocks.h"
 
 typedef struct ascc_curve {
     int32_t dimension;
     int size;        /* processes */
     double edge;     /* of a block, host's unit */
     uint64_t *first; /* [size] of each process's keys; ascending, the first 0 */
-    double *cut;     /* [size] scratch of ascc_curve_cut */
+    double *cut;     /* [size] scratch */
+    /* Blocks that had fluid when ascc_curve_know was told, and those beside them: */
+    ascc_blocks blocks;
+    uint64_t *key; /* [blocks] by which each has its owner */
+    size_t block_capacity, slot_capacity, key_capacity;
+    int64_t low[3], high[3]; /* of those with fluid */
 } ascc_curve;
 
 /* The block that a place is in; beyond 2^20 blocks from the origin all are one. */
@@ -44,8 +51,19 @@ typedef struct ascc_load {
     uint64_t key, cost;
 } ascc_load;
 
+/* Where there is fluid: joined loads. What is beyond the box of these blocks belongs to who has the nearest in it, what
+ * is neither known nor beyond to its place on the curve. False without memory: then nothing is known. */
+bool ascc_curve_know(ascc_curve *curve, const ascc_allocator *allocator, const ascc_load *load,
+                     size_t count);
+/* Nothing is known any more; the memory stays for the next time. */
+void ascc_curve_forget(ascc_curve *curve);
+void ascc_curve_release(ascc_curve *curve, const ascc_allocator *allocator);
+
 /* Sorts loads by key and joins those of one block; returns how many are left. */
 size_t ascc_loads_join(ascc_load *load, size_t count);
+
+/* The most that a piece costs, of loads that are joined. */
+double ascc_curve_most(ascc_curve *curve, const ascc_load *load, size_t count);
 
 /* Pieces of about the same cost, of loads that are joined. limit: how far a cut may move, in costs of a piece. */
 void ascc_curve_cut(ascc_curve *curve, const ascc_load *load, size_t count, double limit);

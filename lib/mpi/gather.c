@@ -152,6 +152,7 @@ void ascc_mpi_become(ascc_mpi_particles *set, ascc_particles *fresh)
     fresh->message = p->message;
     p->message = old.message;
     set->curve.edge = ASCC_MPI_EDGE * p->spacing;
+    ascc_curve_forget(&set->curve);
     set->cut = false;
 }
 

@@ -99,8 +99,15 @@ static ascc_status no_memory(ascc_mpi_particles *set)
                      "no memory to share fluid among processes");
 }
 
-/* Everybody has the loads of all, and cuts the curve alike. */
-static ascc_status cut(ascc_mpi_particles *set, double limit)
+/* Has so much fluid come or gone that what was known of the balance is no use? */
+static bool is_other_fluid(const ascc_mpi_particles *set)
+{
+    const double before = (double)set->total, now = (double)set->halo.total;
+    return fabs(now - before) > OTHER * before;
+}
+
+/* Everybody has the loads of all, cuts the curve alike where it does not balance, and knows where fluid is. */
+static ascc_status look(ascc_mpi_particles *set, bool anew)
 {
     size_t count = 0, all;
     ascc_status status = ascc_mpi_agree(set, find_loads(set, &count) ? ASCC_OK : no_memory(set));
@@ -109,34 +116,31 @@ static ascc_status cut(ascc_mpi_particles *set, double limit)
     if (status != ASCC_OK)
         return status;
     ascc_load *load = set->incoming.at;
-    ascc_curve_cut(&set->curve, load, ascc_loads_join(load, all), limit);
+    double total = 0.0;
+    count = ascc_loads_join(load, all);
+    for (size_t i = 0; i < count; i++)
+        total += (double)load[i].cost;
+    if (anew || ascc_curve_most(&set->curve, load, count) * set->size > UNEVEN * total)
+        ascc_curve_cut(&set->curve, load, count, anew ? set->size : FARTHEST);
+    const bool known = ascc_curve_know(&set->curve, &set->context->allocator, load, count);
     set->owners.known = false;
-    set->cut = true;
-    return ASCC_OK;
-}
-
-/* Has so much fluid come or gone that what was known of the balance is no use? */
-static bool is_other_fluid(const ascc_mpi_particles *set)
-{
-    const double before = (double)set->total, now = (double)set->halo.total;
-    return fabs(now - before) > OTHER * before;
+    status = ascc_mpi_agree(set, known ? ASCC_OK : no_memory(set));
+    if (status != ASCC_OK)
+        ascc_curve_forget(&set->curve);
+    set->cut = status == ASCC_OK;
+    return status;
 }
 
 static ascc_status balance(ascc_mpi_particles *set)
 {
     const bool anew = !set->cut || is_other_fluid(set);
-    uint64_t most = cost_of(set), total = most;
     if (!anew && ++set->age < LOOK)
         return ASCC_OK;
     set->age = 0;
     set->total = set->halo.total;
     set->halo.reached = fmax(ASCC_MPI_SPARE * set->farthest, ASCC_MPI_NEAR * set->local->spacing);
     set->farthest = 0.0;
-    ascc_mpi_reduce(set, &most, 1, MPI_UINT64_T, MPI_MAX);
-    ascc_mpi_reduce(set, &total, 1, MPI_UINT64_T, MPI_SUM);
-    if (!anew && (double)most * set->size <= UNEVEN * (double)total)
-        return ASCC_OK;
-    return cut(set, anew ? set->size : FARTHEST);
+    return look(set, anew);
 }
 
 /* ---- Owners ---- */

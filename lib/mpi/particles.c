@@ -68,6 +68,7 @@ static void close_lists(ascc_mpi_particles *set)
         ascc_release(a, set->curve.first, size, sizeof *set->curve.first);
     if (set->curve.cut)
         ascc_release(a, set->curve.cut, size, sizeof *set->curve.cut);
+    ascc_curve_release(&set->curve, a);
     if (set->parts)
         ascc_release(a, set->parts, 2 * size, sizeof *set->parts);
     if (set->owners.rank)
