@@ -108,6 +108,68 @@ class Page(unittest.TestCase):
         self.assertIn("| 2,000 ± 1,414 |", line)
         self.assertIn("| **0** |", line)
 
+    def rows_of(self, **errors):
+        return [
+            {"row": name, "model": name, "runs": [dict(ablation_run(e, [0.0 if name == "ASCC" else 1.0]),
+                                                       figures=[dict(figures(e), err_n1_difference=e)]) for e in list_of]}
+            for name, list_of in errors.items()
+        ]  # fmt: skip
+
+    def test_what_is_seen_names_who_leads_and_what_is_not_told_apart(self):
+        paper = {"table1": dict.fromkeys(("ASCC", "GNS", "CConv"))}
+        rows = self.rows_of(ASCC=[1e-4, 2e-4], GNS=[4e-4, 6e-4], CConv=[5e-4, 6e-4])
+        text = page.seen(rows, 1.0, paper)
+        self.assertIn("Least in one step, RMSE, EMD and momentum: ASCC.", text)
+        self.assertIn("free flight has: ASCC 85 %, GNS 50 % and CConv 45 %.", text)
+        self.assertIn("Within their ± in RMSE: GNS and CConv.", text)
+        self.assertIn("GNS: 2 of 2 rollouts lose a tenth of the particles or more.", text)
+        rows[0]["runs"][0]["figures"][0].update(last_frame=1, emd_final=None)
+        self.assertIn("ASCC: 2 of 2 rollouts lose a tenth of the particles or more and 1 of 2 rollouts end early.",
+                      page.seen(rows, None, paper))  # fmt: skip
+        for run in rows[0]["runs"]:
+            run["figures"][0].update(jsd_mean=0.05, escaped_max=0)
+        self.assertIn("ASCC leads every column.", page.seen(rows, None, paper))
+        self.assertEqual(page.seen(rows[:1], 1.0, paper), "")
+
+    def test_remarks_stand_in_the_page_of_a_whole_run_alone(self):
+        kept, free = page.REMARKS, {"2": [], "3": []}
+        with tempfile.TemporaryDirectory() as folder:
+            page.REMARKS = os.path.join(folder, "remarks.md")
+            with open(page.REMARKS, "w", encoding="utf-8") as file:
+                file.write("for whom\n\n## Table 2\n\nA remark.\n\n## Speed\n\nAnother.\n")
+            try:
+                self.assertEqual(page.remarks(page.REMARKS), {"Table 2": "A remark.", "Speed": "Another."})
+                for quick in (False, True):
+                    path = os.path.join(folder, "tables.md")
+                    page.write(path, tables.Size(quick), PAPER, [], free, [], [], None, [])
+                    with open(path, encoding="utf-8") as file:
+                        text = file.read()
+                    self.assertEqual(("A remark." in text, "Another." in text, "for whom" in text), (not quick, not quick, False))
+            finally:
+                page.REMARKS = kept
+
+    def test_a_cost_that_there_is_not_says_why(self):
+        costs = [{"label": "GNS, 3D", "model": "gns3d", "missing": False, "cost": [{"ms": 500.0, "mib": 340.0}, "failed"]}]
+        size = tables.Size(False)
+        line = list(page.speed(costs, {"ms": 40000.0, "particles": 50000}, PAPER, size))[2]
+        self.assertEqual(line, "| GNS, 3D (`gns3d`) | 500 | 340 | failed |  | 80 |")
+
+    def test_the_first_network_of_each_baseline_is_kept(self):
+        with tempfile.TemporaryDirectory() as folder:
+            rows = []
+            for k, name in enumerate(("GNS", "GNS" + tables.UNTOLD, "ASCC", "CConv")):
+                paths = [os.path.join(folder, f"{k}{seed}") for seed in "ab"]
+                for path in paths:
+                    with open(path, "w", encoding="utf-8") as file:
+                        file.write(path)
+                rows.append({"row": name, "model": f"m{k}", "trained": True, "runs": [{"path": path} for path in paths]})
+            rows[3]["runs"] = []
+            out = os.path.join(folder, "out")
+            tables.keep(rows, out)
+            self.assertEqual(os.listdir(out), ["m0.safetensors"])
+            with open(os.path.join(out, "m0.safetensors"), encoding="utf-8") as file:
+                self.assertTrue(file.read().endswith("0a"))
+
     def test_only_rows_that_the_paper_has_too_are_put_in_order(self):
         rows = [{"row": name, "runs": [{"figures": [figures(e)]}]} for name, e in (("GNS", 2.0), ("GNS, shipped", 1.0))]
         self.assertEqual(page.table1_order(rows, PAPER), "GNS; as in the paper")

@@ -17,6 +17,7 @@ sys.path.insert(0, os.path.join(ROOT, "examples", "python", "src"))
 
 import tensorfile  # noqa: E402
 
+MANY = 200000  # particles of which a step is repeated less often
 FRAME = 0.02  # s: of a frame in section 5.4
 SPH_STEP = 1e-4  # s: of the paper's reference
 
@@ -37,10 +38,10 @@ def attempt(errors, what, measure):
 
 
 class Tools:
-    """The programs of a build, their cache, and how much is wanted."""
+    """The programs of a build, their cache, how much is wanted, and where the data that is given lies."""
 
-    def __init__(self, build, cache, quick):
-        self.build, self.cache, self.quick = os.path.abspath(build), cache, quick
+    def __init__(self, build, cache, quick, shared):
+        self.build, self.cache, self.quick, self.shared = os.path.abspath(build), cache, quick, shared
         os.environ.setdefault("ASCC_LIBRARY", os.path.join(self.build, "lib", "libascc.so.0"))
 
     def program(self, name, *arguments):
@@ -132,14 +133,14 @@ class Tools:
         def measure(_):
             out, _ = self.program("bench/bench", "step", "--scene", "block", "--model", model, "--particles",
                                   particles, "--threads", 1, "--output", "none", "--figures", "none",
-                                  *(["--quick"] if self.quick else []))  # fmt: skip
+                                  "--shared", self.shared, "--repeats", 3 if self.quick or particles > MANY else 7)  # fmt: skip
             rows = list(csv.DictReader(line for line in out.splitlines() if not line.startswith("#")))
             if not rows:
                 raise Failed("bench step printed no row")
             ns, scratch = (float(rows[-1][key]) for key in ("ns_per_particle", "scratch_bytes_per_particle"))
             return {"ms": ns * particles * 1e-6, "mib": scratch * particles / 2**20}
 
-        made_from = ["2", File(model) if os.path.exists(model) else model, particles, self.quick]
+        made_from = ["3", File(model) if os.path.exists(model) else model, particles, self.quick]
         return self.cache.result("step", made_from, measure)
 
     def sph_cost(self, particles):

@@ -4,6 +4,8 @@
 import os
 import statistics
 
+REMARKS = os.path.join(os.path.dirname(os.path.abspath(__file__)), "remarks.md")
+
 
 def number(value, digits=3):
     return f"{value:,.0f}" if abs(value) >= 100 else f"{value:.{digits}g}"
@@ -134,6 +136,84 @@ def table1_order(rows, paper):
     return orders(own, {name: p["rmse"] for name, p in paper["table1"].items()})
 
 
+COLUMNS = [  # of Table 1, by the name of a figure and the words for it
+    ("err_n1_difference", "one step"), ("rmse_20", "RMSE"), ("emd_final", "EMD"), ("jsd_mean", "JSD"),
+    ("escaped_max", "escapes"), ("momentum", "momentum"),
+]  # fmt: skip
+
+
+def of_networks(row, name):
+    """One number of each network of a row; of rollouts that did not get there none."""
+    if name == "momentum":
+        return [max(run["momentum"][0]) for run in row["runs"] if run["momentum"] and run["momentum"][0]]
+    return [value for run in row["runs"] if (value := mean_of(run, name)) is not None]
+
+
+def joined(words):
+    words = list(words)
+    return " and ".join([", ".join(words[:-1]), words[-1]] if len(words) > 1 else words)
+
+
+def seen(rows, free, paper):
+    """What Table 1 says, in sentences: who leads each column, what is told apart, who fails."""
+    alike = [row for row in rows if row["row"] in paper["table1"] and row["runs"]]
+    if len(alike) < 2:
+        return ""
+    led = {}
+    for name, words in COLUMNS:
+        means = {row["row"]: statistics.fmean(v) for row in alike if (v := of_networks(row, name))}
+        best = [row for row in means if means[row] == min(means.values())]
+        if means and len(best) < len(means):
+            led.setdefault(joined(best), []).append(words)
+    text = [f"Least in {joined(words)}: {best}." for best, words in led.items()]
+    if len(led) == 1 and len(next(iter(led.values()))) == len(COLUMNS):
+        text = [f"{next(iter(led))} leads every column."]
+    if free:
+        of_free = [
+            f"{row['row']} {100 * (1 - 1000 * statistics.fmean(v) / free):.0f} %"
+            for row in alike
+            if (v := of_networks(row, "err_n1_difference"))
+        ]
+        text.append(f"After one step, less error than free flight has: {joined(of_free)}.")
+    text += [s for name, words in COLUMNS[:2] if (s := close(alike, name, words))]
+    text += [s for row in alike if (s := failing(row))]
+    return " ".join(text)
+
+
+def close(rows, name, words):
+    """Neighbours in the order of a column that differ by less than both standard deviations together."""
+    found = {row["row"]: values for row in rows if len(values := of_networks(row, name)) > 1}
+    order = sorted(found, key=lambda row: statistics.fmean(found[row]))
+    pairs = [
+        f"{a} and {b}"
+        for a, b in zip(order, order[1:])
+        if statistics.fmean(found[b]) - statistics.fmean(found[a]) < statistics.stdev(found[a]) + statistics.stdev(found[b])
+    ]
+    return f"Within their ± in {words}: {', '.join(pairs)}." if pairs else ""
+
+
+def failing(row):
+    """How many rollouts a tenth of the particles left, or that ended early."""
+    figures = [f for run in row["runs"] for f in run["figures"]]
+    left = [f for f in figures if f["escaped_max"] > 0.1 * f["fluid"]]
+    ended = [f for f in figures if f["last_frame"] + 1 < f["frames"]]
+    said = [f"{len(some)} of {len(figures)} rollouts {what}" for some, what in
+            ((left, "lose a tenth of the particles or more"), (ended, "end early")) if some]  # fmt: skip
+    return f"{row['row']}: {joined(said)}." if said else ""
+
+
+def remarks(path):
+    """Paragraphs of remarks.md by their headings: what somebody saw in a whole run, in its numbers and pictures."""
+    found, heading = {}, None
+    with open(path, encoding="utf-8") as file:
+        for line in file:
+            if line.startswith("## "):
+                heading = line[3:].strip()
+            elif heading:
+                found[heading] = found.get(heading, "") + line
+    return {heading: text.strip() for heading, text in found.items()}
+
+
 def table2(found, paper):
     yield (
         "| row | what it adds | training, CPU s | RMSE after 20 steps, mm | EMD after 30 steps, mm | momentum error | "
@@ -170,12 +250,10 @@ def speed(costs, sph, paper, size):
     for row in costs:
         cells = []
         for cost in row["cost"]:
-            cells += [number(cost["ms"]), number(cost["mib"])] if cost else ["-", "-"]
+            cells += [cost, ""] if isinstance(cost, str) else [number(cost["ms"]), number(cost["mib"])]
         ratio = "-"
-        three = "3D" in row["label"]
-        if sph and row["cost"][0] and three:
-            each = sph["ms"] / sph["particles"]
-            ratio = f"{each / (row['cost'][0]['ms'] / size.particles):.3g}"
+        if sph and not isinstance(row["cost"][0], str) and "3D" in row["label"]:
+            ratio = f"{sph['ms'] / sph['particles'] / (row['cost'][0]['ms'] / size.particles):.3g}"
         name = f"`{row['model']}`" + (", no model file" if row["missing"] else "")
         yield f"| {row['label']} ({name}) | " + " | ".join(cells) + f" | {ratio} |"
     p = paper["speed"]
@@ -191,7 +269,8 @@ INTRO = """# The paper's tables and figures
 {scope}
 
 Measures are those of [measures.md](measures.md). A method is a line of `bench/tables/methods.csv`, its network a config of `examples/train`; this command makes the sequences, trains, chooses, measures and
-draws. What fails is said at the end, nothing is left out.
+draws. What fails is said at the end, nothing is left out. `--keep DIR` copies the baselines of the first seed, of which [models/baselines.md](models/baselines.md) tells. What is said to be seen is computed;
+`bench/tables/remarks.md` has what somebody saw beyond it.
 """
 
 QUICK = """**This page is of a quick run.** It shows that everything runs, not how good anything is. """
@@ -207,6 +286,8 @@ From the smallest RMSE to the largest, of those trained alike: {order}. ± is th
 (of a graph network with the five velocities before; free flight has {free} mm). RMSE is of positions after 20 steps of 0.005 s from the first frame; the paper does not say after how many. EMD is the mean
 distance of the best assignment after the last frame, of rollouts that got there; the paper's has no unit. "Escaped" is the share of particles outside the walls at the worst moment: rollouts are not clipped.
 
+What is seen: {seen}
+{remark}
 **These are small networks, trained for a minute and a half.** What was trained, and what the authors of each method trained:
 
 {networks}
@@ -229,6 +310,8 @@ From the smallest RMSE to the largest, of those trained alike: {order}. One seed
 after one step. "No gravity given": learnt and tested on the same sequences with gravity taken out of what the network and the integration are told, so that it must learn it, which GNS does in the papers.
 Its momentum in a scene without gravity cannot be asked. The paper's figures are of its 2D set.
 
+What is seen: {seen}
+{remark}
 {networks}
 """
 
@@ -251,7 +334,7 @@ gravity, falling. Networks of the first seed; particles outside the window of th
 ![the first test sequence after so many steps of every method](figures/tables-failures.png)
 
 The first test sequence, in the window of the truth: every method runs until it fails, and stays as it was then. A rollout stops when a particle would move more than a step allows (`max_displacement`) or is not finite.
-"""
+{remark}"""
 
 TABLE2 = """## Table 2: what each part is worth
 
@@ -260,7 +343,7 @@ TABLE2 = """## Table 2: what each part is worth
 From the highest score to the lowest: {order}. `examples/train/ablation2d.json`, changed row by row, equally many iterations, on the sequences of Table 1; errors on the two given test sequences; ± over the seeds. "Steps until it fails": mean of the rollouts that do, to the end of those
 sequences. The paper's overall score is the harmonic mean of normalised RMSE, EMD and momentum scores, the full network 1. How it normalises is not said; here an error's score is the mean error of the full networks over the network's own, and momentum's 1 / (1 + error), so
 that 0 gives 1 and an error as large as the momentum 1/2; a network whose rollout did not reach the end has no EMD and no score. What differs: two-dimensional, networks of 8 to 24 channels, without limit or contact, training of a minute.
-"""
+{remark}"""
 
 SPEED = """## Section 5.4: speed
 
@@ -269,7 +352,7 @@ SPEED = """## Section 5.4: speed
 One thread, CPU time of one step of `bench step --scene block` (no walls); a frame is the model's time step, {frame}. MiB is the scratch of a step. The last column is CPU time of the
 reference SPH of `examples/reference` for a frame of 0.02 s in steps of 1e-4 s ({sph}) over that of the network, per particle, same machine. DualSPHysics 5.4 itself took 203 us a particle and frame at that step in 2D (10,000 particles),
 {dual}. The paper compares a graphics card with one CPU thread; these are one CPU thread both. Time does not depend on how long a network was trained. Farthest points cost the square of the particles: a million would take PointNet++ hours, and it is not asked for them.
-"""
+{remark}"""
 
 
 def write(path, size, paper, rows, floors, ablations, costs, sph, errors):
@@ -278,22 +361,30 @@ def write(path, size, paper, rows, floors, ablations, costs, sph, errors):
     numbers = {"first": size.particles, "second": size.more,
                "tries": size.rates + size.noises, **vars(size), "sequences": len(floors["2"])}  # fmt: skip
 
+    def remark(heading):
+        """Nobody looked at a quick run."""
+        return "" if size.quick or heading not in said_of else f"\n{said_of[heading]}\n"
+
+    said_of = remarks(REMARKS)
+
     def part(text, dimension, of_it):
         free = [v for v in of(floors[dimension], "err_n1_difference") if v is not None]
-        return text.format(**numbers, table="\n".join(table1(of_it, paper)), order=table1_order(of_it, paper),
+        free = 1000 * statistics.fmean(free) if free else None
+        return text.format(**numbers, seen=seen(of_it, free, paper), remark=remark(f"Table 1, {dimension}D"), table="\n".join(table1(of_it, paper)), order=table1_order(of_it, paper),
                            networks="\n".join(networks(of_it, paper)),
-                           free=number(1000 * statistics.fmean(free)) if free else "-")  # fmt: skip
+                           free=number(free) if free else "-")  # fmt: skip
 
     parts = [INTRO.format(scope=(QUICK if size.quick else "") + SCOPE.format(**numbers)), part(TABLE1, "2", flat)]
     if any(run["figures"] for row in solid for run in row["runs"]):
         parts.append(part(TABLE1_3D, "3", solid))
-    parts += [FIGURE4, FIGURE5.format(time=size.fall * 0.005)]
-    parts.append(TABLE2.format(table="\n".join(table2(ablations, paper)), order=score_order(ablations, paper)))
+    parts += [FIGURE4, FIGURE5.format(time=size.fall * 0.005, remark=remark("Figures"))]
+    parts.append(TABLE2.format(table="\n".join(table2(ablations, paper)), order=score_order(ablations, paper),
+                               remark=remark("Table 2")))  # fmt: skip
     said = f"{sph['ms'] / sph['particles'] * 1000:.3g} us a particle at {sph['particles']:,}" if sph else "not measured"
-    ours = next((c["cost"][0] for c in costs if c["model"] == "water3d" and c["cost"][0]), None)
+    ours = next((c["cost"][0] for c in costs if c["model"] == "water3d" and not isinstance(c["cost"][0], str)), None)
     dual = f"{203 / (ours['ms'] * 1000 / size.particles):.3g} times what `water3d` takes in 3D" if ours else "for scale"
     parts.append(SPEED.format(table="\n".join(speed(costs, sph, paper, size)), sph=said, dual=dual,
-                              frame="0.02 s of the 3D networks and 0.005 s of the 2D ones"))  # fmt: skip
+                              remark=remark("Speed"), frame="0.02 s of the 3D networks and 0.005 s of the 2D ones"))  # fmt: skip
     parts.append("## What is missing or failed\n\n" + "\n".join(missing(rows, costs, errors) or ["Nothing."]) + "\n")
     with open(path + ".partial", "w", encoding="utf-8") as file:
         file.write("\n".join(parts))

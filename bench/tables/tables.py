@@ -6,6 +6,7 @@ import csv
 import json
 import math
 import os
+import shutil
 
 import ablation
 import draw
@@ -74,7 +75,7 @@ def each_of(tools, size, model, world):
 def networks(tools, size, row, rows, world, plane):
     """Each network of a row; a row without training is a shipped file. rows, plane: of 2D, where rates are chosen."""
     if not row["trained"]:
-        path = next((path for path in places(row["model"]) if os.path.exists(path)), None)
+        path = shipped(row["model"])
         return [{"path": path, "seconds": None}] if path else []
     name = row["row"].removesuffix(UNTOLD)
     model = next(other["model"] for other in rows if other["row"] == name)
@@ -91,11 +92,19 @@ def networks(tools, size, row, rows, world, plane):
     return made
 
 
-def places(name):
-    return [
-        os.path.join(ROOT, "examples", "models", name + ".safetensors"),
-        os.path.join(ROOT, "examples", "train", "runs", name + ".safetensors"),
-    ]
+def shipped(name):
+    """The model file of that name, if there is one."""
+    folders = (("models",), ("models", "baselines"), ("train", "runs"))
+    paths = (os.path.join(ROOT, "examples", *folder, name + ".safetensors") for folder in folders)
+    return next((path for path in paths if os.path.exists(path)), None)
+
+
+def keep(rows, folder):
+    """Copies the first network of each baseline to a folder, under the name of its config."""
+    os.makedirs(folder, exist_ok=True)
+    for row in rows:
+        if row["trained"] and row["runs"] and not row["row"].startswith("ASCC") and not row["row"].endswith(UNTOLD):
+            shutil.copyfile(row["runs"][0]["path"], os.path.join(folder, row["model"] + ".safetensors"))
 
 
 def table1(tools, size, rows, told, flat, plane, errors):
@@ -142,22 +151,23 @@ def table2(tools, size, world, errors):
     return found
 
 
-SPEED = [  # label, model, largest number of particles it is asked for (0: all)
-    ("ours, 3D", "water3d", 0), ("ours, 3D, large", "water3d-large", 50000), ("ours, 2D", "water2d", 50000),
-    ("PointNet++, 3D", "pointnet3d", 50000), ("GNS, 3D", "gns3d", 0),
-    ("CConv, published, 3D", "cconv", 50000), ("DMCF, published, 3D", "dmcf", 50000),
+SPEED = [  # label, model, why it is not asked for the larger number of particles
+    ("ours, 3D", "water3d", ""), ("ours, 3D, large", "water3d-large", ""),
+    ("PointNet++, 3D", "pointnet3d", "hours: farthest points"), ("GNS, 3D", "gns3d", ""),
+    ("CConv, published, 3D", "cconv", ""), ("DMCF, published, 3D", "dmcf", "13 GiB: not asked"),
+    ("ours, 2D", "water2d", ""), ("PointNet++, 2D", "pointnet2d", "hours: farthest points"),
+    ("GNS, 2D", "gns2d", "not asked"), ("CConv, 2D", "cconv2d", "not asked"),
 ]  # fmt: skip
 
 
 def speed(tools, size, errors):
+    """Costs of shipped networks at both numbers of particles, each a measurement or why there is none."""
     found = []
-    for label, name, most in SPEED:
-        path = next((p for p in places(name) if os.path.exists(p)), name if name in ("cconv", "dmcf") else None)
-        costs = []
-        for particles in (size.particles, size.more):
-            asked = path and (not most or particles <= most)
-            cost = asked and attempt(errors, f"{label}: {particles} particles", lambda: tools.step_cost(path, particles))
-            costs.append(cost or None)
+    for label, name, why in SPEED:
+        path = shipped(name) or (name if name in ("cconv", "dmcf") else None)
+        measure = lambda particles, p=path, l=label: attempt(  # noqa: E731
+            errors, f"{l}: {particles} particles", lambda: tools.step_cost(p, particles)) or "failed"  # fmt: skip
+        costs = [measure(size.particles), why or measure(size.more)] if path else ["-", "-"]
         found.append({"label": label, "model": name, "missing": not path, "cost": costs})
     sph = attempt(errors, "reference SPH in steps of 1e-4 s", lambda: tools.sph_cost(size.sph))
     return found, sph
@@ -173,18 +183,19 @@ def main():
     parser.add_argument("--set", action="append", default=[], metavar="NAME=NUMBER", help="another size of one run")
     parser.add_argument("--minutes", type=float, help="begin nothing new after so many: what is missing is told, and the same command goes on")
     parser.add_argument("--only", choices=PARTS, help="measure this part, write no page: several can run side by side")
+    parser.add_argument("--keep", metavar="DIR", help="copy the baselines of the first seed there, as examples/models/baselines has them")
     parser.add_argument("--build", default="build")
     parser.add_argument("--shared", default=os.path.join(ROOT, "..", "shared"))
     parser.add_argument("--page", default=os.path.join(ROOT, "docs", "tables.md"))
     options = parser.parse_args()
     size, errors = Size(options.quick, options.set), []
     cache = Cache(os.path.join(options.build, "tables"), None if options.minutes is None else 60 * options.minutes)
-    tools = Tools(options.build, cache, options.quick)
+    shared = os.path.abspath(options.shared)
+    tools = Tools(options.build, cache, options.quick, shared)
     with open(os.path.join(HERE, "paper.json"), encoding="utf-8") as file:
         paper = json.load(file)
     rows = methods()
     flat, solid = ([row for row in rows if row["dimension"] == d] for d in "23")
-    shared = os.path.abspath(options.shared)
     plane, space = (World(tools, size, dimension, shared) for dimension in "23")
     asked = lambda part: options.only in (None, part)  # noqa: E731
     if asked("2d"):
@@ -193,6 +204,8 @@ def main():
         table1(tools, size, solid, space, flat, plane, errors)
     ablations = table2(tools, size, plane, errors) if asked("ablation") else []
     costs, sph = speed(tools, size, errors) if asked("speed") else ([], None)
+    if options.keep:
+        keep(rows, options.keep)
     if options.only:
         raise SystemExit(3 if cache.left else 0)
     lines = scenes.figure5(tools, size, flat, errors)
