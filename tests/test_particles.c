@@ -859,7 +859,7 @@ static void rows_beyond_the_end_and_fields_a_kind_lacks_are_refused(void **state
     }
     static const struct {
         int kind, field;
-    } lacking[] = {{ASCC_FLUID, ASCC_NORMAL}, {ASCC_BOUNDARY, ASCC_MASS}, {ASCC_FLUID, 4},
+    } lacking[] = {{ASCC_FLUID, ASCC_NORMAL}, {ASCC_BOUNDARY, ASCC_MASS}, {ASCC_FLUID, 5},
                    {ASCC_FLUID, -1},          {2, ASCC_POSITION},         {-1, ASCC_POSITION}};
     for (size_t i = 0; i < COUNT_OF(lacking); i++) {
         const ascc_kind kind = (ascc_kind)lacking[i].kind;
@@ -1468,8 +1468,9 @@ static void the_snapshot_is_the_documented_words(void **state)
     self->set->wall_impulse[1] = -2;
     self->set->wall_velocity[0] = 0.75;
     self->set->rest[0] = -9;
+    self->set->detail[0] = 0.25;
     const uint64_t expected[] = {UINT64_C(0x50414e5343435341),
-                                 4,
+                                 5,
                                  2,
                                  1,
                                  1,
@@ -1498,6 +1499,7 @@ static void the_snapshot_is_the_documented_words(void **state)
                                  0,
                                  0, /* in no body's frame */
                                  (uint64_t)-9,
+                                 test_bits(0.25),
                                  7, /* the next body, and no body */
                                  0,
                                  0};
@@ -1550,7 +1552,8 @@ static void impossible_snapshots_with_a_right_checksum_are_refused(void **state)
     add_scene(self->set, 29, 2, 2);
     enum { FLUID = 9, POSITION = 9, MOMENTUM = 13, MASS = 17, ID = 19, WALL_POSITION = 21 };
     enum { NORMAL = 25, WALL_ID = 33, BODY = 35, WALL_VELOCITY = 37 };
-    enum { OWN_POSITION = 41, OWN_NORMAL = 45, REST = 49, NEXT_BODY = 51, BODIES = 52, WORDS = 54 };
+    enum { OWN_POSITION = 41, OWN_NORMAL = 45, REST = 49 };
+    enum { DETAIL = 51, NEXT_BODY = 53, BODIES = 54, WORDS = 56 };
     static const struct {
         size_t word;
         uint64_t value;
@@ -1560,7 +1563,8 @@ static void impossible_snapshots_with_a_right_checksum_are_refused(void **state)
         {1, 1, ASCC_ERROR_FORMAT}, /* which has fewer words */
         {1, 2, ASCC_ERROR_FORMAT},
         {1, 3, ASCC_ERROR_FORMAT},
-        {1, 5, ASCC_ERROR_FORMAT},
+        {1, 4, ASCC_ERROR_FORMAT},
+        {1, 6, ASCC_ERROR_FORMAT},
         {2, 1, ASCC_ERROR_FORMAT}, /* dimension */
         {2, 4, ASCC_ERROR_FORMAT},
         {2, UINT64_MAX, ASCC_ERROR_FORMAT},
@@ -1603,6 +1607,9 @@ static void impossible_snapshots_with_a_right_checksum_are_refused(void **state)
         {OWN_NORMAL + 1, UINT64_C(0x7ff8000000000000), ASCC_ERROR_FORMAT},
         {OWN_NORMAL, UINT64_C(0x4000000000000000), ASCC_ERROR_FORMAT},
         {REST + 1, UINT64_C(1) << 32, ASCC_ERROR_FORMAT},
+        {DETAIL, UINT64_C(0x7ff8000000000000), ASCC_ERROR_FORMAT},
+        {DETAIL + 1, UINT64_C(0x3ff0000000000001), ASCC_ERROR_FORMAT}, /* above 1 */
+        {DETAIL, UINT64_C(0xbff0000000000000), ASCC_ERROR_FORMAT},
         {NEXT_BODY, 0, ASCC_ERROR_FORMAT}, /* which points have */
         {NEXT_BODY, (UINT64_C(1) << 31) + 1, ASCC_ERROR_FORMAT},
         {BODIES, 1, ASCC_ERROR_FORMAT},
@@ -1812,7 +1819,8 @@ static uint64_t fingerprint(const unsigned char *bytes, size_t size)
 }
 
 /* Taken when every array was still written by hand: snapshots of that time must be read for ever. They end before
- * what versions added: velocities of walls, then places in the frames of bodies, and bodies, then how long fluid has been at rest. */
+ * what versions added: velocities of walls, then places in the frames of bodies, and bodies, then how long fluid has been at rest, then
+ * how much detail is wanted of it. */
 static void assert_golden(fixture *self, uint64_t snapshot, uint64_t hash)
 {
     add_scene(self->set, 36, 37, 23);
@@ -1823,10 +1831,10 @@ static void assert_golden(fixture *self, uint64_t snapshot, uint64_t hash)
     const size_t vectors = self->set->boundary_count * (size_t)self->set->dimension * 8;
     if (ascc_particles_hash(self->set) != hash)
         fail_msg("hash %llx", (unsigned long long)ascc_particles_hash(self->set));
-    for (size_t version = 1; version <= 3; version++) {
-        const size_t bodies = version < 3 ? 0 : 16, rest = self->set->fluid_count * 8;
-        const size_t fields =
-            taken.size - 24 - rest - (3 - version) * vectors - (version < 3 ? vectors : 0);
+    for (size_t version = 1; version <= 4; version++) {
+        const size_t bodies = version < 3 ? 0 : 16, scalars = self->set->fluid_count * 8;
+        const size_t fields = taken.size - 24 - (version < 4 ? 2 : 1) * scalars -
+                              (version < 3 ? 4 - version : 0) * vectors;
         const size_t size = fields + bodies + 8;
         unsigned char *const old = malloc(size);
         memcpy(old, taken.bytes, fields);
@@ -1837,7 +1845,8 @@ static void assert_golden(fixture *self, uint64_t snapshot, uint64_t hash)
             fail_msg("snapshot %llx", (unsigned long long)fingerprint(old, size));
         self->set->wall_velocity[2] = self->set->wall_own_position[1] =
             1; /* which goes away again */
-        self->set->rest[3] = 5;
+        self->set->rest[3] = version < 4 ? 5 : self->set->rest[3];
+        self->set->detail[3] = 0.5;
         self->set->next_body = 0;
         assert_int_equal(ascc_particles_restore(self->set, old, size), ASCC_OK);
         const picture now = take_picture(self->set);

@@ -409,6 +409,16 @@ class Ladders(Case):
         third.run(self.set, gravity=[0.0] * self.set.dimension)
         self.fails(ascc.Status.ARGUMENT, third.replay, self.set, [7], says="rungs[0]")
 
+    def test_detail_is_counted_by_rung(self):
+        d, h = self.set.dimension, self.set.spacing
+        self.set.add_fluid(ascc.block((0.0,) * d, (4,) * d, h))
+        count = 4**d
+        self.set.set(FLUID, ascc.DETAIL, np.ones(count))
+        np.testing.assert_array_equal(self.set.get(FLUID, ascc.DETAIL), np.ones(count))
+        ladder = ascc.Ladder([self.model, self.model])
+        ladder.replay(self.set, [0])
+        self.assertEqual(ladder.statistics.particles_on, (0, count))
+
 
 class Life(Case):
     def test_errors_name_what_is_wrong(self):

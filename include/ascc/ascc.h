@@ -238,6 +238,9 @@ typedef enum ascc_field {
     ASCC_VELOCITY = 1,
     ASCC_MASS = 2,   /* fluid; kg, one number. Setting it keeps the velocity */
     ASCC_NORMAL = 3, /* boundary; points into the fluid, length 1 */
+    /* Fluid; how much of a particle a ladder's best model computes on lower rungs, from 0 (at first) to 1
+     * (docs/budget.md). */
+    ASCC_DETAIL = 4,
     /* Fluid; the velocity before the last step; + 1: before the one before that; up to + 7. For models that look back
      * (graph networks). A particle counts as having moved all the time before as it did in the earliest of these that is
      * known, or as it does: setting one sets those before it, too, and setting ASCC_VELOCITY all of them. */
@@ -860,7 +863,10 @@ ASCC_API void ascc_ladder_destroy(ascc_ladder **ladder);
  * it (ascc_ladder_measure). The choice depends on the clock; all else is as promised of ascc_step_run: the choices
  * made (ascc_ladder_get_choices) give the same bits again (ascc_ladder_replay).
  *
- * errors    as ascc_step_run; ascc_ladder_message names the rung.
+ * Fluid with an ASCC_DETAIL above 0 is computed by the best model to that share, whatever the rung (docs/budget.md).
+ *
+ * errors    as ascc_step_run, also MISMATCH where detail is wanted and the rung's model and the best cannot share a step;
+ *           ascc_ladder_message names the rung.
  */
 ASCC_API ascc_status ascc_ladder_run(ascc_ladder *ladder, ascc_particles *particles,
                                      const ascc_forces *forces, int32_t count);
@@ -902,6 +908,8 @@ typedef struct ascc_ladder_statistics {
     /* As in ascc_step_statistics, of the last step whose rung is measured, with max_distance or measure_distance. */
     double distance_mean, distance_worst;
     uint64_t distance_row, distance_count;
+    /* Of the last step: fluid particles that each rung computed, those between two (ASCC_DETAIL) by both. */
+    uint64_t particles_on[ASCC_MAX_RUNGS];
 } ascc_ladder_statistics;
 
 ASCC_API ascc_status ascc_ladder_get_statistics(const ascc_ladder *ladder,

@@ -353,7 +353,7 @@ static ascc_status demand_output(ascc_network_run *run)
     uint8_t *guessed =
         run->plan->relaxation.guess ? run->value[run->plan->relaxation.guess].active : NULL;
     for (size_t i = 0; i < h->fluid_count; i++) {
-        const bool wanted = !ascc_hierarchy_is_idle(h, i);
+        const bool wanted = !ascc_hierarchy_is_quiet(h, i);
         active[set == ASCC_SET_FLUID ? i : h->whole[ASCC_SET_FLUID][i]] = wanted;
         if (guessed)
             guessed[i] = wanted;
@@ -365,6 +365,10 @@ static ascc_status demand_output(ascc_network_run *run)
         return ascc_fail(run->tools->message, ASCC_ERROR_MEMORY, "no memory for the last layer");
     memcpy(fluid, active, h->set[set].count);
     ascc_status status = demand_rows(run, key[0], fluid, active);
+    for (size_t i = 0; h->share && i < h->fluid_count;
+         i++) /* what counts for nothing need not be there */
+        if (h->share[i] == 0.0f)
+            active[set == ASCC_SET_FLUID ? i : h->whole[ASCC_SET_FLUID][i]] = 0;
     /* Rows that sleep push the others with the pressure that they guess. */
     for (size_t i = 0; guessed && h->idle && status == ASCC_OK && i < h->fluid_count; i++)
         guessed[i] |= active[set == ASCC_SET_FLUID ? i : h->whole[ASCC_SET_FLUID][i]];
@@ -488,7 +492,8 @@ static ascc_status make_lists(ascc_network_run *run)
     const ascc_network *network = run->network;
     const bool halo = run->hierarchy->halo != NULL;
     ascc_status status = halo ? demand_own(run) : demand_output(run);
-    for (int i = 0; status == ASCC_OK && i < 2 && network->relaxation_key[i] >= 0; i++)
+    const bool relaxes = !run->hierarchy->joins;
+    for (int i = 0; status == ASCC_OK && relaxes && i < 2 && network->relaxation_key[i] >= 0; i++)
         status = make_relaxed(run, network->relaxation_key[i]);
     const size_t lasting = lasting_room(run);
     run->before_layers = ascc_arena_point_of(run->tools->arena);

@@ -20,8 +20,11 @@ typedef struct ascc_hierarchy {
     uint32_t *whole[2];  /* and back: [set row] of fluid, boundary */
     int32_t *place[2];   /* low words of fluid, boundary once more: [set row][4], the last 0 */
     const uint8_t *idle; /* rows of fluid whose impulses nobody wants; NULL = none */
-    ascc_halo *halo;     /* of fluid that other processes have, idle here; NULL = they have none */
-    uint32_t *halo_row;  /* with a halo: [host's fluid row] its row of the fluid */
+    /* [rows of fluid] what of them the output takes, and what is 0 is not wanted; NULL = all of all */
+    const float *share;
+    bool joins;         /* only the output's impulses are wanted: no relaxation follows */
+    ascc_halo *halo;    /* of fluid that other processes have, idle here; NULL = they have none */
+    uint32_t *halo_row; /* with a halo: [host's fluid row] its row of the fluid */
     const uint8_t *own[ASCC_MAX_LEVELS]; /* with a halo: [rows of level] 1 = computed here */
     float *
         drift; /* motions of walls in spacings a time step, [boundary set row][4]; NULL: all rest */
@@ -74,6 +77,13 @@ static inline size_t ascc_hierarchy_host_row(const ascc_hierarchy *hierarchy, in
 static inline bool ascc_hierarchy_is_idle(const ascc_hierarchy *hierarchy, size_t fluid_row)
 {
     return hierarchy->idle && hierarchy->idle[fluid_row];
+}
+
+/* Is nothing wanted of a row's pairs? */
+static inline bool ascc_hierarchy_is_quiet(const ascc_hierarchy *hierarchy, size_t fluid_row)
+{
+    return ascc_hierarchy_is_idle(hierarchy, fluid_row) ||
+           (hierarchy->share && hierarchy->share[fluid_row] == 0.0f);
 }
 
 /* Host's boundary row of a row of the boundary. */

@@ -297,9 +297,10 @@ ascc_status ascc_pair_sum_open(ascc_pair_sum *sum, const ascc_network_run *run, 
     const size_t count = h->set[set].count;
     uint8_t *fluid = ascc_arena_lend(arena, count, 1);
     double *mass = ascc_arena_lend(arena, count, sizeof *mass);
-    uint8_t *idle = h->idle ? ascc_arena_lend(arena, count, 1) : NULL;
+    const bool some = h->idle || h->share;
+    uint8_t *idle = some ? ascc_arena_lend(arena, count, 1) : NULL;
     int64_t *sums = ascc_arena_lend(arena, count, stride * sizeof *sums);
-    if (!fluid || !mass || !sums || (h->idle && !idle))
+    if (!fluid || !mass || !sums || (some && !idle))
         return ascc_fail(run->tools->message, ASCC_ERROR_MEMORY, "no memory for the impulses");
     memset(sums, 0, count * stride * sizeof *sums);
     for (size_t i = 0; i < count; i++) {
@@ -307,7 +308,7 @@ ascc_status ascc_pair_sum_open(ascc_pair_sum *sum, const ascc_network_run *run, 
         fluid[i] = row < h->fluid_count;
         mass[i] = fluid[i] ? fluid_mass[row] : 0.0;
         if (idle)
-            idle[i] = fluid[i] && h->idle[set == ASCC_SET_ALL ? h->part[i] : i];
+            idle[i] = fluid[i] && ascc_hierarchy_is_quiet(h, set == ASCC_SET_ALL ? h->part[i] : i);
     }
     *sum = (ascc_pair_sum){.run = run,
                            .set = set,

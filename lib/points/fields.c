@@ -104,6 +104,15 @@ static ascc_status check_past(const ascc_candidate *row, ascc_message *message)
     return ASCC_OK;
 }
 
+static ascc_status check_detail(const ascc_candidate *row, ascc_message *message)
+{
+    const double *const weight = row->values;
+    if (*weight >= 0.0 && *weight <= 1.0)
+        return ASCC_OK;
+    return ascc_fail(message, ASCC_ERROR_ARGUMENT, "%s: row %zu is %g, not from 0 to 1", row->name,
+                     row->row, ascc_readable(*weight));
+}
+
 static ascc_status check_body(const ascc_candidate *row, ascc_message *message)
 {
     const int32_t *const body = row->values;

@@ -36,10 +36,11 @@
     X(ASCC_BOUNDARY, wall_own_position, double, VECTOR, UNHASHED, PRIVATE, check_position)         \
     X(ASCC_BOUNDARY, wall_own_normal, double, VECTOR, UNHASHED, PRIVATE, check_own_normal)         \
     X(ASCC_FLUID, rest, int32_t, SCALAR, NONZERO, PRIVATE, NULL)     /* rest.h */                  \
-    X(ASCC_FLUID, past, double, PAST, UNHASHED, PRIVATE, check_past) /* the last step's first */
+    X(ASCC_FLUID, past, double, PAST, UNHASHED, PRIVATE, check_past) /* the last step's first */   \
+    X(ASCC_FLUID, detail, double, SCALAR, NONZERO, ASCC_DETAIL, check_detail)
 
 /* Raise it with every change of the list. */
-#define ASCC_SNAPSHOT_VERSION 4
+#define ASCC_SNAPSHOT_VERSION 5
 
 /* Where a field stands in the list: ASCC_FIELD_position and so on. */
 typedef enum ascc_field_index {
@@ -53,6 +54,7 @@ typedef enum ascc_field_index {
 static inline size_t ascc_snapshot_fields(uint64_t version)
 {
     return version == ASCC_SNAPSHOT_VERSION ? ASCC_FIELD_COUNT
+           : version == 4                   ? ASCC_FIELD_detail
            : version == 3                   ? ASCC_FIELD_rest
            : version == 2                   ? ASCC_FIELD_wall_own_position
            : version == 1                   ? ASCC_FIELD_wall_velocity

@@ -183,7 +183,7 @@ bool ascc_snapshot_read_head(const unsigned char *head, uint64_t words,
     *why = "of a version not known here";
     const uint64_t version = ascc_get_word(head + 8), past = version >> PAST_SHIFT;
     const size_t fields = ascc_snapshot_fields(version & UINT32_MAX);
-    if (fields == 0 || past > (fields == ASCC_FIELD_COUNT ? ASCC_MAX_HISTORY : 0))
+    if (fields == 0 || past > (fields > ASCC_FIELD_past ? ASCC_MAX_HISTORY : 0))
         return false;
 
     *why = "of no possible dimension or size";

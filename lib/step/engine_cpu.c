@@ -37,6 +37,29 @@ static void tell(ascc_step_state *state)
         s->level_points[l] = points_of(h, l);
 }
 
+/* Rows of the last layer times their shares: impulses of pairs are linear in them. */
+static void share_rows(void *data, size_t begin, size_t end, int32_t slot)
+{
+    (void)slot;
+    const ascc_network_run *run = data;
+    const ascc_term *term = &run->plan->output.term;
+    const ascc_value *value = &run->value[term->source];
+    const size_t width = ascc_padded(term->inputs);
+    float *rows = term->rectify ? value->rectified : value->raw;
+    for (size_t i = begin; i < end; i++)
+        for (size_t c = 0; c < width; c++)
+            rows[i * width + c] =
+                value->active[i] ? run->hierarchy->share[i] * rows[i * width + c] : 0.0f;
+}
+
+static void take_share(ascc_step_state *state)
+{
+    const int32_t source = state->network->plan->output.term.source;
+    if (state->hierarchy.share && source >= 2)
+        ascc_workers_run(state->tools.workers, state->hierarchy.set[ASCC_SET_FLUID].count, 4096,
+                         share_rows, &state->run);
+}
+
 ascc_status ascc_engine_cpu(ascc_step_state *state)
 {
     ascc_status status = ascc_stage_sight(state);
@@ -54,11 +77,14 @@ ascc_status ascc_engine_cpu(ascc_step_state *state)
     if (state->looks)
         return status;
     if (status == ASCC_OK) {
+        take_share(state);
         const ascc_impulse_scale scale = impulse_scale(state);
         status = state->network->plan->output.term.operation->impulses(
             &state->run, &scale, &state->impulses, &state->statistics->pair_count);
     }
     ascc_arena_return(state->tools.arena, state->before_features);
+    state->shares = state->hierarchy.share;
+    state->hierarchy.share = NULL; /* of the output alone */
     if (status == ASCC_OK)
         ascc_network_done(&state->run);
     ascc_stage_lap(state, "pairs");

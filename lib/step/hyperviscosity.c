@@ -30,8 +30,8 @@ void ascc_relaxation_velocity(const ascc_step_state *state, size_t row, float ve
     const ascc_particles *p = state->particles;
     const size_t d = (size_t)p->dimension;
     const size_t at = ascc_hierarchy_host_row(&state->hierarchy, ASCC_SET_FLUID, row);
-    const double unit = state->motion->time_step * p->quantum * state->length_unit /
-                        state->network->plan->relaxation.support;
+    const double unit =
+        state->motion->time_step * p->quantum * state->length_unit / state->relaxation->support;
     const bool moves = !ascc_hierarchy_is_idle(&state->hierarchy, row);
     for (size_t c = 0; c < 4; c++)
         velocity[c] =
@@ -42,8 +42,8 @@ void ascc_relaxation_velocity(const ascc_step_state *state, size_t row, float ve
 
 double ascc_relaxation_quanta(const ascc_step_state *state)
 {
-    return state->network->plan->relaxation.support / state->length_unit /
-           state->motion->time_step / state->particles->quantum;
+    return state->relaxation->support / state->length_unit / state->motion->time_step /
+           state->particles->quantum;
 }
 
 ascc_status ascc_relaxation_add(ascc_step_state *state, const int64_t *given)
@@ -73,14 +73,13 @@ float ascc_smoothing_bound(const ascc_step_state *state)
     const double gravity =
         ascc_vector_length(state->motion->gravity) * state->length_unit / (unit * unit);
     const double below =
-        plan->relaxation.viscosity_below * (trained > 0.0 ? gravity / trained : 1.0);
-    return (float)(below * state->motion->time_step * unit / plan->relaxation.support);
+        state->relaxation->viscosity_below * (trained > 0.0 ? gravity / trained : 1.0);
+    return (float)(below * state->motion->time_step * unit / state->relaxation->support);
 }
 
 int32_t ascc_smoothing_sweeps(const ascc_step_state *state)
 {
-    return ascc_smoothing_bound(state) > 0.0f ? state->network->plan->relaxation.viscosity.count
-                                              : 0;
+    return ascc_smoothing_bound(state) > 0.0f ? state->relaxation->viscosity.count : 0;
 }
 
 /* Of all fluid, that of other processes, too. */
@@ -187,7 +186,7 @@ static ascc_status smooth(sweep *w, int32_t k)
     const ascc_halo_rows velocity = {w->velocity, 4 * sizeof *w->velocity};
     const ascc_halo_rows rough = {w->rough, 4 * sizeof *w->rough};
     uint64_t pairs;
-    w->factor = ascc_smoothing_share(state, state->network->plan->relaxation.viscosity.omega[k]) *
+    w->factor = ascc_smoothing_share(state, state->relaxation->viscosity.omega[k]) *
                 ascc_relaxation_quanta(state) * w->heaviest;
     ascc_workers_run(workers, s->count, 4 * ROWS, velocity_rows, w);
     ascc_status status = ascc_hierarchy_refresh(&state->hierarchy, ASCC_SET_FLUID, &velocity, 1);

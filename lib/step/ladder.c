@@ -7,6 +7,7 @@
 #include <string.h>
 
 #include "commit.h"
+#include "detail.h"
 
 _Static_assert(sizeof(void *) != 8 || sizeof(ascc_ladder_options) == 56, "released layout");
 _Static_assert(sizeof(void *) != 8 || sizeof(ascc_ladder_statistics) % 8 == 0,
@@ -233,20 +234,63 @@ static void add_run(ascc_ladder_statistics *to, const ascc_step_statistics *from
     to->steps++;
 }
 
-/* The step of a rung; its time. */
+/* What of the fluid of a step on this rung the best model computes. */
+typedef struct shares {
+    bool some, all;
+    uint64_t base, best; /* particles */
+} shares;
+
+static shares find_shares(const ascc_ladder *ladder, int32_t rung, const ascc_particles *p)
+{
+    shares s = {.base = p->fluid_count};
+    if (rung == ladder->count - 1)
+        return s;
+    s.base = 0;
+    for (size_t i = 0; i < p->fluid_count; i++) {
+        s.best += p->detail[i] > 0.0;
+        s.base += p->detail[i] < 1.0;
+    }
+    s.some = s.best > 0;
+    s.all = s.some && s.base == 0;
+    return s;
+}
+
+static ascc_status run_shares(ascc_ladder *ladder, int32_t rung, const shares *s, ascc_particles *p,
+                              const ascc_forces *forces, bool continues)
+{
+    const int32_t top = ladder->count - 1, own = s->all ? top : rung;
+    ascc_step *step = ladder->rung[own];
+    const char *obstacle =
+        s->some && !s->all
+            ? ascc_detail_obstacle(&step->model->plan, &ladder->rung[top]->model->plan)
+            : NULL;
+    if (obstacle)
+        return ascc_ladder_fail(ladder, ASCC_ERROR_MISMATCH, "detail: %s and %s: %s",
+                                name_of(ladder, rung), name_of(ladder, top), obstacle);
+    step->continues = continues;
+    step->detail = s->some && !s->all ? ladder->rung[top] : NULL;
+    const ascc_status status = ascc_step_run(step, p, forces, 1);
+    step->continues = false;
+    step->detail = NULL;
+    if (status != ASCC_OK) /* logged by the step */
+        return ascc_fail(&ladder->message, status, "%s: %s", name_of(ladder, own),
+                         step->message.text);
+    ladder->ran = own;
+    memset(ladder->statistics.particles_on, 0, sizeof ladder->statistics.particles_on);
+    ladder->statistics.particles_on[top] = s->best;
+    ladder->statistics.particles_on[rung] = s->base;
+    return ASCC_OK;
+}
+
+/* A step on a rung; its time. */
 static ascc_status run_rung(ascc_ladder *ladder, int32_t rung, ascc_particles *p,
                             const ascc_forces *forces, bool continues, double *seconds)
 {
-    ascc_step *step = ladder->rung[rung];
-    step->continues = continues;
     const double begin = now(ladder);
-    const ascc_status status = ascc_step_run(step, p, forces, 1);
+    const shares s = find_shares(ladder, rung, p);
+    const ascc_status status = run_shares(ladder, rung, &s, p, forces, continues);
     *seconds = now(ladder) - begin;
-    step->continues = false;
-    if (status != ASCC_OK) /* logged by the step */
-        return ascc_fail(&ladder->message, status, "%s: %s", name_of(ladder, rung),
-                         step->message.text);
-    return ASCC_OK;
+    return status;
 }
 
 /* Notes a choice; room for it was made before the step. */
@@ -364,13 +408,13 @@ static ascc_status run_once(ascc_ladder *ladder, ascc_particles *p, const ascc_f
         ladder->choice = before;
         return status;
     }
-    add_run(&ladder->statistics, &ladder->rung[rung]->statistics);
+    add_run(&ladder->statistics, &ladder->rung[ladder->ran]->statistics);
     tell(ladder, before.rung, before.reason);
     note(ladder, rung, seconds + looked);
-    note_distance(ladder, rung);
+    note_distance(ladder, ladder->ran);
     ascc_rung_choice_learn(&ladder->choice, seconds, p->fluid_count);
     if (given < 0)
-        doubt_if_strange(ladder, rung);
+        doubt_if_strange(ladder, ladder->ran);
     return ASCC_OK;
 }
 

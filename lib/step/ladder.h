@@ -21,6 +21,7 @@ struct ascc_ladder {
     void *user;
     double budget, max_distance; /* the latter: 0 = none */
     ascc_rung_choice choice;
+    int32_t ran;              /* whose step was the last: of the best where all is detail */
     ascc_rung_change *change; /* [change_count], the first at step 0 */
     size_t change_count, change_capacity;
     unsigned char *kept; /* a set's snapshot while rungs are measured on it */

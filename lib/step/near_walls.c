@@ -86,6 +86,12 @@ bool ascc_near_walls(ascc_step_state *state, uint8_t **near)
 {
     const ascc_particles *p = state->particles;
     ascc_arena *arena = state->tools.arena;
+    if (state->walls_seen) {
+        *near = ascc_arena_lend(arena, p->boundary_count, 1);
+        if (*near)
+            memcpy(*near, state->walls_seen, p->boundary_count);
+        return *near != NULL;
+    }
     const double margin = MARGIN * state->network->plan->spacing / state->length_unit;
     const double edge = margin + state->network->wall_reach / state->length_unit;
     if (!(state->network->wall_reach > 0.0) || isinf(edge) || state->advance.walls_move ||

@@ -60,9 +60,10 @@ typedef struct relaxation {
     float *scratch;      /* [slots][4][room] */
     size_t room;
     ascc_relaxation_trace *trace; /* of a step whose values are kept, else NULL */
-    float omega;                  /* of the sweep under way */
-    bool slows;                   /* sweeps are on velocities, not densities */
-    float repulsion;              /* below this distance, in supports */
+    float omega, other; /* of the sweep under way; of the model that has the rest of rows */
+    const float *share; /* [count] of rows; NULL = there is one model */
+    bool slows;         /* sweeps are on velocities, not densities */
+    float repulsion;    /* below this distance, in supports */
     atomic_size_t bad;
     atomic_uint_least64_t compression, largest;
 } relaxation;
@@ -344,7 +345,11 @@ static void leave_out(relaxation *r, size_t i)
 static float smoothing_of(const relaxation *r, size_t i, float squares)
 {
     const float lattice = (float)r->constants->lattice_response;
-    return r->excess[i] < -ASCC_SURFACE ? 0.0f : 1.0f / (squares > lattice ? squares : lattice);
+    const ascc_relaxation *const *part = r->state->part;
+    const float own = !r->share || part[0]->viscosity.count ? 1.0f : 0.0f;
+    const float rest = r->share && part[1]->viscosity.count ? 1.0f : 0.0f;
+    const float share = r->share ? r->share[i] * own + (1.0f - r->share[i]) * rest : own;
+    return r->excess[i] < -ASCC_SURFACE ? 0.0f : share / (squares > lattice ? squares : lattice);
 }
 
 static void look_around(void *data, size_t begin, size_t end, int32_t slot)
@@ -521,11 +526,12 @@ static ascc_status open_relaxation(relaxation *r, ascc_step_state *state, bool s
     ascc_relaxed *relaxed = &state->relaxed;
     const ascc_network_run *run = &state->run;
     const ascc_search_tools *tools = &state->tools;
-    const ascc_relaxation *constants = &state->network->plan->relaxation;
+    const ascc_relaxation *constants = state->relaxation;
     ascc_relaxation_round *round = &relaxed->round[relaxed->rounds - 1];
     *r =
         (relaxation){.state = state,
                      .constants = constants,
+                     .share = state->part[0] ? state->shares : NULL,
                      .rows = round->rows[0],
                      .wall_rows = round->rows[1],
                      .count = state->hierarchy.set[ASCC_SET_FLUID].count,
@@ -571,6 +577,26 @@ static void push_rows(void *data, size_t begin, size_t end, int32_t slot)
             r->move[i * 4 + c] = 0.0f;
 }
 
+static float omega_of(const relaxation *r, size_t i)
+{
+    return r->share ? r->share[i] * r->omega + (1.0f - r->share[i]) * r->other : r->omega;
+}
+
+/* Sweep k of a model that may have fewer of them, and fewer rounds. */
+static float omega_at(const relaxation *r, const ascc_relaxation *constants, int32_t k)
+{
+    const ascc_sweeps *sweeps = r->slows ? &constants->divergence : &constants->pressure;
+    const bool runs = r->slows || r->state->relaxed.rounds <= constants->rounds;
+    return runs && k < sweeps->count ? (float)sweeps->omega[k] : 0.0f;
+}
+
+static void begin_sweep(relaxation *r, int32_t k)
+{
+    const ascc_relaxation *const *part = r->state->part;
+    r->omega = omega_at(r, part[0] ? part[0] : r->constants, k);
+    r->other = part[0] ? omega_at(r, part[1], k) : 0.0f;
+}
+
 static void relax_rows(void *data, size_t begin, size_t end, int32_t slot)
 {
     (void)slot;
@@ -579,7 +605,7 @@ static void relax_rows(void *data, size_t begin, size_t end, int32_t slot)
     r->state->tools.kernels->divergence(&pairs, begin, end, r->own, r->move, r->change);
     for (size_t i = begin; i < end; i++) {
         const float pressure =
-            r->pressure[i] + r->omega * (r->excess[i] + r->change[i]) * r->response[i];
+            r->pressure[i] + omega_of(r, i) * (r->excess[i] + r->change[i]) * r->response[i];
         r->pressure[i] = pressure > 0.0f ? pressure : 0.0f;
     }
 }
@@ -599,7 +625,7 @@ static void begin_rows(void *data, size_t begin, size_t end, int32_t slot)
     (void)slot;
     relaxation *r = data;
     for (size_t i = begin; i < end; i++) {
-        const float pressure = r->omega * r->excess[i] * r->response[i];
+        const float pressure = omega_of(r, i) * r->excess[i] * r->response[i];
         r->change[i] = 0.0f;
         r->pressure[i] = pressure > 0.0f ? pressure : 0.0f;
     }
@@ -618,7 +644,7 @@ static ascc_status sweep(relaxation *r, const ascc_sweeps *sweeps)
         trace_sweep(r, -1);
     }
     for (int32_t k = 0; k < sweeps->count && status == ASCC_OK; k++) {
-        r->omega = (float)sweeps->omega[k];
+        begin_sweep(r, k);
         if (k > 0 || r->guess) {
             ascc_workers_run(workers, r->count, ROWS, push_rows, r);
             status = refresh_move(r);
@@ -784,7 +810,16 @@ static ascc_status apply(relaxation *r, int64_t *given)
 
 /* ---- The stages ---- */
 
-/* Mean and largest of what is left of the excess as the last sweep began. */
+/* Does another round change this row? */
+static bool goes_on(const relaxation *r, size_t i)
+{
+    const ascc_relaxation *const *part = r->state->part;
+    const int32_t most = r->constants->rounds;
+    return !r->share || (r->share[i] > 0.0f && part[0]->rounds == most) ||
+           (r->share[i] < 1.0f && part[1]->rounds == most);
+}
+
+/* Mean of what is left of the excess as the last sweep began, and the largest of rows that go on. */
 static void measure_rows(void *data, size_t begin, size_t end, int32_t slot)
 {
     (void)slot;
@@ -794,7 +829,7 @@ static void measure_rows(void *data, size_t begin, size_t end, int32_t slot)
         const float c = r->excess[i] + r->change[i];
         const uint64_t units = c > 0.0f ? (uint64_t)((double)c / COMPRESSION_UNIT) : 0;
         sum += units;
-        largest = units > largest ? units : largest;
+        largest = units > largest && goes_on(r, i) ? units : largest;
     }
     atomic_fetch_add_explicit(&r->compression, sum, memory_order_relaxed);
     uint_least64_t seen = atomic_load_explicit(&r->largest, memory_order_relaxed);
@@ -907,7 +942,7 @@ static ascc_status run_round(ascc_step_state *state, ascc_compression *found)
 
 ascc_status ascc_stage_relaxation(ascc_step_state *state)
 {
-    const ascc_relaxation *constants = &state->network->plan->relaxation;
+    const ascc_relaxation *constants = state->relaxation;
     if (!constants->pressure.count || ascc_step_is_empty(state))
         return ASCC_OK;
     ascc_compression found;
@@ -948,7 +983,7 @@ static ascc_status slow_down(ascc_step_state *state, relaxation *r, int64_t *giv
 
 ascc_status ascc_stage_divergence(ascc_step_state *state)
 {
-    const ascc_relaxation *constants = &state->network->plan->relaxation;
+    const ascc_relaxation *constants = state->relaxation;
     if (!(constants->divergence.count || constants->viscosity.count) || ascc_step_is_empty(state))
         return ASCC_OK;
     const ascc_arena_mark mark = ascc_arena_mark_of(state->tools.arena);

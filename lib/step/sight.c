@@ -108,6 +108,23 @@ static double *scaled(const ascc_search_tools *tools, const double *position, si
     return job.to;
 }
 
+/* What of rows the output takes, in the order of the set. */
+static ascc_status take_shares(ascc_step_state *state)
+{
+    ascc_hierarchy *h = &state->hierarchy;
+    const size_t count = h->set[ASCC_SET_FLUID].count;
+    h->joins = state->joins;
+    if (!state->share)
+        return ASCC_OK;
+    float *share = ascc_arena_take(state->tools.arena, count, sizeof *share);
+    if (!share)
+        return ascc_fail(state->tools.message, ASCC_ERROR_MEMORY, "no memory for %zu rows", count);
+    for (size_t i = 0; i < count; i++)
+        share[i] = state->share[ascc_hierarchy_host_row(h, ASCC_SET_FLUID, i)];
+    h->share = share;
+    return ASCC_OK;
+}
+
 /* Rows that sleep among others that do, in the order of the set. */
 static ascc_status take_idle(ascc_step_state *state)
 {
@@ -156,5 +173,7 @@ ascc_status ascc_stage_sight(ascc_step_state *state)
         return ascc_fail(tools->message, ASCC_ERROR_MEMORY, "no memory for the features");
     status = ascc_hierarchy_build(&state->hierarchy, tools, state->network->plan, &scene);
     ascc_arena_return(tools->arena, before_scene);
+    if (status == ASCC_OK)
+        status = take_shares(state);
     return status == ASCC_OK ? take_idle(state) : status;
 }

@@ -107,6 +107,15 @@ typedef struct ascc_step_state {
     ascc_step_statistics *statistics; /* also the times of stages */
     double since;                     /* when the stage under way began, s */
     bool looks;                       /* only: the step ends with what the network sees */
+    const ascc_relaxation
+        *relaxation; /* the model's; of two models (detail.h) what both ask for together, */
+    const ascc_relaxation
+        *part[2];             /* and each one's, of rows by `shares` and the rest; NULL = of one */
+    struct ascc_step *detail; /* whose network has a share of the fluid (detail.h); NULL = none */
+    const float *share;       /* [host's fluid rows] of what this network gives; NULL = all of it */
+    const uint8_t
+        *walls_seen; /* [host's boundary rows] 1 = by this network; NULL = all that are near */
+    bool joins;      /* what it gives is added to another's step, which has the relaxation */
     /* What stages make: */
     ascc_sleep sleep;
     ascc_advance advance;
@@ -114,6 +123,7 @@ typedef struct ascc_step_state {
     float *fluid_features, *boundary_features; /* lent until the network has run */
     ascc_arena_mark before_features;
     ascc_hierarchy hierarchy;
+    const float *shares; /* [rows of fluid] `share` in the order of the set */
     ascc_network_run run;
     ascc_relaxed relaxed;
     const float *wall_volume; /* of the host's boundary rows, where they end */

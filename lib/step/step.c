@@ -7,6 +7,7 @@
 
 #include "base/host_array.h"
 #include "commit.h"
+#include "detail.h"
 #include "estimate.h"
 #include "points/bodies.h"
 #include "substeps.h"
@@ -186,7 +187,9 @@ void ascc_stage_lap(ascc_step_state *state, const char *name)
 /* Without fluid there is nothing to see. */
 static ascc_status run_engine(ascc_step_state *state)
 {
-    return ascc_step_is_empty(state) ? ASCC_OK : state->engine(state);
+    return ascc_step_is_empty(state) ? ASCC_OK
+           : state->detail           ? ascc_engine_detail(state)
+                                     : state->engine(state);
 }
 
 /* What a step is, but for the last stage, which alone changes the particles. */
@@ -285,6 +288,7 @@ ascc_status ascc_step_once(ascc_step *step, ascc_particles *p, const ascc_motion
         .network = &step->network,
         .particles = p,
         .motion = motion,
+        .relaxation = &step->model->plan.relaxation,
         .halo = step->halo,
         .turn = step->turn,
         .length_unit = step->model_length,
@@ -294,6 +298,7 @@ ascc_status ascc_step_once(ascc_step *step, ascc_particles *p, const ascc_motion
         .engine = step->engine,
         .trust = step->measures ? &step->model->trust : NULL,
         .looks = step->looks,
+        .detail = step->detail,
         .walls = &step->walls,
         .tools = {arena, step->context->workers, &step->context->kernels, &step->message},
         .statistics = &step->statistics,
@@ -458,9 +463,21 @@ static void take_all_back(const ascc_step *step, ascc_particles *p)
 static ascc_status prepare(ascc_step *step, ascc_particles *p, const ascc_motion *motion,
                            int32_t *count)
 {
+    ascc_step *const detail = step->detail;
+    int32_t own = 1;
     ascc_status status = ascc_count_substeps(step, p, motion, count);
     if (status == ASCC_OK)
         status = remember(step, p);
+    if (status == ASCC_OK && detail) {
+        ascc_find_units(detail, p);
+        detail->statistics = (ascc_step_statistics){.level_count = detail->model->plan.level_count};
+        status = ascc_count_substeps(detail, p, motion, &own);
+        if (status == ASCC_OK)
+            status = remember(detail, p);
+        if (status != ASCC_OK)
+            step->message = detail->message;
+        *count = own > *count ? own : *count;
+    }
     if (status == ASCC_OK && *count > 1 && !keep_all(step, p))
         status = ascc_fail(&step->message, ASCC_ERROR_MEMORY, "no memory to keep %zu particles",
                            p->fluid_count);

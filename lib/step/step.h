@@ -27,9 +27,10 @@ struct ascc_step {
     size_t kept_capacity;
     ascc_turn turn;  /* of the run under way; none for a trainer's steps */
     ascc_halo *halo; /* of the run under way: fluid of other processes; NULL = there is none */
-    bool measures;   /* how far its input is from training's */
-    bool looks;      /* the next run sees and moves nothing */
-    bool continues;  /* the next run adds to impulses of walls that another step's began */
+    struct ascc_step *detail; /* of the run under way: whose network has a share; NULL = none */
+    bool measures;            /* how far its input is from training's */
+    bool looks;               /* the next run sees and moves nothing */
+    bool continues;           /* the next run adds to impulses of walls that another step's began */
     ascc_step_statistics statistics;
     ascc_message message;
 };

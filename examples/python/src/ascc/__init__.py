@@ -42,7 +42,7 @@ from ._scenes import block, box, surface
 
 FLUID, BOUNDARY = Kind.FLUID, Kind.BOUNDARY
 POSITION, VELOCITY, MASS, NORMAL = Field.POSITION, Field.VELOCITY, Field.MASS, Field.NORMAL
-EARLIER_VELOCITY = Field.EARLIER_VELOCITY
+DETAIL, EARLIER_VELOCITY = Field.DETAIL, Field.EARLIER_VELOCITY
 
 __version__ = "0.1.0"
 __all__ = [
@@ -51,6 +51,7 @@ __all__ = [
     "BodyImpulse",
     "Compression",
     "Context",
+    "DETAIL",
     "Drain",
     "DrainKind",
     "Error",

@@ -32,6 +32,7 @@ class LadderStatistics:
     distance_worst: float
     distance_row: int
     distance_count: int
+    particles_on: Tuple[int, ...]
 
 
 class Ladder(_Handle):
@@ -166,7 +167,7 @@ class Ladder(_Handle):
             "support_impulse",
         ):
             values[name] = tuple(values[name])
-        for name in ("predicted", "steps_on"):
+        for name in ("predicted", "steps_on", "particles_on"):
             values[name] = tuple(values[name][: raw.rung_count])
         values["reason"] = LadderReason(raw.reason)
         return LadderStatistics(**values)

@@ -46,7 +46,8 @@ class Kind(IntEnum):
 
 
 class Field(IntEnum):
-    """A property of a particle: POSITION of both kinds, VELOCITY and MASS of fluid, NORMAL of boundary.
+    """A property of a particle: POSITION of both kinds, VELOCITY and MASS of fluid, NORMAL of boundary,
+    DETAIL of fluid: how much of it a ladder's best model computes.
 
     EARLIER_VELOCITY is that before the last step, EARLIER_VELOCITY + 1 that before the one before it, up to + 7:
     setting one sets those before it, too, setting VELOCITY all of them."""
@@ -55,6 +56,7 @@ class Field(IntEnum):
     VELOCITY = 1
     MASS = 2
     NORMAL = 3
+    DETAIL = 4
     EARLIER_VELOCITY = 16
 
 
@@ -331,6 +333,7 @@ class LadderStatistics(Sized):
         ("distance_worst", c_double),
         ("distance_row", c_uint64),
         ("distance_count", c_uint64),
+        ("particles_on", c_uint64 * 16),
     ]
 
 

@@ -454,7 +454,7 @@ class Particles(_Handle):
     # Fields
 
     def _components(self, field: int) -> int:
-        return 1 if field == Field.MASS else self.dimension
+        return 1 if field in (Field.MASS, Field.DETAIL) else self.dimension
 
     def set(self, kind: Kind, field: int, values: ArrayLike, first: int = 0) -> None:
         """Sets a Field of as many rows as values has, from `first` on."""
@@ -492,7 +492,7 @@ class Particles(_Handle):
             if count is None:
                 count = len(out) if out is not None else max(rows - _size(first), 0)
             components = self._components(field)
-            shape = (_size(count),) if field == Field.MASS else (_size(count), components)
+            shape = (_size(count),) if components == 1 else (_size(count), components)
             if _size(first) + count > rows:
                 raise ValueError(f"rows [{first}, {first + count}) of {rows}")
             array, out = written("out", np.empty(shape, dtype) if out is None else out, shape)
