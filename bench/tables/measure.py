@@ -102,6 +102,18 @@ class Tools:
             tensorfile.write(out, tensors, metadata)
         return out
 
+    # ---- Networks ----
+
+    def published(self, name):
+        """A network that its authors trained and that was given, as a model file; the path, or None."""
+        given = os.path.join(self.shared, "data", "weights", name + ".safetensors")
+        if not os.path.exists(given):
+            return None
+        out = self.cache.path("published", File(given)) + ".safetensors"
+        if not os.path.exists(out):
+            self.ascc("convert", given, "-o", out)
+        return out
+
     # ---- Measures ----
 
     def evaluate(self, model, sequence):

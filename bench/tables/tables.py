@@ -73,9 +73,9 @@ def each_of(tools, size, model, world):
 
 
 def networks(tools, size, row, rows, world, plane):
-    """Each network of a row; a row without training is a shipped file. rows, plane: of 2D, where rates are chosen."""
+    """Each network of a row; a row without training is a shipped or given file. rows, plane: of 2D, where rates are chosen."""
     if not row["trained"]:
-        path = shipped(row["model"])
+        path = shipped(row["model"]) or tools.published(row["model"])
         return [{"path": path, "seconds": None}] if path else []
     name = row["row"].removesuffix(UNTOLD)
     model = next(other["model"] for other in rows if other["row"] == name)

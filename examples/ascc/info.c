@@ -27,8 +27,11 @@ static void print_model(const char *path, const ascc_model_info *m)
                                             : "nothing exactly");
     ascc_line(stdout, "  sees particles at %s",
               m->advected ? "advected positions" : "their current positions");
-    ascc_line(stdout, "  radius            %g m, reaches %g m in a step", m->support_radius,
-              m->receptive_radius);
+    if (m->support_radius > 0.0)
+        ascc_line(stdout, "  radius            %g m, reaches %g m in a step", m->support_radius,
+                  m->receptive_radius);
+    else /* the last layer looks at no neighbours */
+        ascc_line(stdout, "  reaches           %g m in a step", m->receptive_radius);
     if (m->neighbor_limit)
         ascc_line(stdout, "  neighbour limit   %d, mutual", m->neighbor_limit);
     ascc_line(
