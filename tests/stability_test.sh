@@ -61,6 +61,11 @@ holds 'what a method cannot do is no pass' [ "$(grep -c ' cannot: ' out)" = 2 ]
     --scenes 'sleep and wake' >out 2>err
 holds 'a method that knows no sleep says so' grep -q '^sleep and wake  *ballistic .* cannot: no sleep' out
 holds 'a pool that is awake does not pass for asleep' grep -q '^sleep and wake  *water3d-tiny .* 0 % asleep at half' out
+"$stability" --quick --methods ballistic --model "$models/pbf3d.safetensors" --jobs 1 --scenes budget >out 2>err
+holds 'a method without a cheaper model says so' grep -q 'ballistic .* cannot: no cheaper model' out
+holds 'a model changes to the one below and back' grep -qE '^budget +pbf3d .* pass: 180 of 180' out
+ASCC_MODEL_PATH=$models "$stability" --quick --methods none --model demo --jobs 1 --scenes seam >out 2>err
+holds 'a model that cannot share a step says why' grep -qE '^seam +demo .* cannot: detail: ' out
 "$stability" --quick --dimension 2 --frames 20 --docs docs --methods ballistic --model "$models/pbf2d.safetensors" \
     --scenes 'turned tank;sideways gravity;dam break' >out 2>err
 holds 'a flat tank may turn' grep -qE '^turned tank +pbf2d .* pass: 20 of 20' out

@@ -112,7 +112,7 @@ bool cell_open(cell *c, world *w, simulation *s)
 static bool cannot(cell *c, const char *what)
 {
     c->verdict = NONE;
-    snprintf(c->text, sizeof c->text, "cannot: %s", what);
+    snprintf(c->text, sizeof c->text, "cannot: %.110s", what);
     return false;
 }
 
@@ -134,6 +134,42 @@ bool cell_sleeps(cell *c)
 double cell_asleep(const cell *c, const simulation *s)
 {
     return (double)c->method->asleep(s->state) / (double)s->scene.fluid_count;
+}
+
+bool cell_has_ladder(cell *c)
+{
+    return c->method->set_budget || cannot(c, "no cheaper model");
+}
+
+void cell_excuse_ladder(cell *c)
+{
+    char why[sizeof c->text];
+    const char *refusal = strstr(c->text, "detail: ");
+    if (!refusal)
+        refusal = strstr(c->text, "step: rung ");
+    if (c->verdict != FAIL || !refusal)
+        return;
+    snprintf(why, sizeof why, "%s", refusal);
+    (void)cannot(c, why);
+}
+
+bool cell_set_budget(cell *c, simulation *s, double particles)
+{
+    ascc_method_error error = {"no budget can be set"};
+    return c->method->set_budget(s->state, particles, &error) || cell_fail(c, "%.100s", error.text);
+}
+
+ascc_method_choices cell_choices(const cell *c, const simulation *s)
+{
+    ascc_method_choices choices = {false, 0, 0};
+    c->method->choices(s->state, &choices);
+    return choices;
+}
+
+bool cell_set_detail(cell *c, simulation *s, const double *weight)
+{
+    ascc_method_error error = {"no detail can be set"};
+    return c->method->set_detail(s->state, weight, &error) || cell_fail(c, "%.100s", error.text);
 }
 
 bool cell_drive_body(cell *c, simulation *s, const double velocity[3], const double spin[3])

@@ -56,6 +56,14 @@ bool cell_takes_fluid(cell *c);
 bool cell_sleeps(cell *c);
 /* The share of the fluid that sleeps. */
 double cell_asleep(const cell *c, const simulation *s);
+/* False: the method has no cheaper model below its own, and the cell says so. */
+bool cell_has_ladder(cell *c);
+/* A cell that failed since two models cannot be one ladder has not been asked anything. */
+void cell_excuse_ladder(cell *c);
+/* What a frame may cost from now on, in particles; what ran; how much of each particle the method's own model computes. */
+bool cell_set_budget(cell *c, simulation *s, double particles);
+ascc_method_choices cell_choices(const cell *c, const simulation *s);
+bool cell_set_detail(cell *c, simulation *s, const double *weight);
 /* Moves the body of the world in the next frame; its wall points are then where it ends. */
 bool cell_drive_body(cell *c, simulation *s, const double velocity[3], const double spin[3]);
 /* The body at its mass, kg, for a frame: what the fluid gave it in the last one and gravity. */

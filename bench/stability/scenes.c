@@ -500,5 +500,18 @@ const stability_scene stability_scenes[] = {
      "tenth than "
      "where none may sleep, no escape, no pair in 1,000 below spacing / 5",
      200, 400, stability_pool_with_a_drop},
+    {"budget",
+     "a dam breaks, in the middle third of the frames with half of what they may cost, pbf below: "
+     "changes to it and "
+     "back, no frame beyond the budget, no escape, pairs below spacing / 5 at most 0.1 %, nothing "
+     "faster after a "
+     "change than before, nor than half of a fall through the box",
+     180, 600, stability_budget},
+    {"seam",
+     "water slides through a trough, half of it computed by the model, half by pbf: density (of "
+     "rest) and speed (of "
+     "the fastest) of slices of 2 spacings within 3 % of what either model makes alone, or between "
+     "the two",
+     60, 60, stability_seam},
     {NULL, NULL, 0, 0, NULL},
 };

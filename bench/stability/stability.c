@@ -422,6 +422,7 @@ int main(int argc, char **argv)
         }
         i++;
     }
+    (void)setenv("ASCC_MODEL_PATH", "examples/models", 0); /* pbf3d, pbf2d: the models below */
     if (!(s.minutes > 0.0))
         s.minutes = s.quick ? 2.5 : 55.0;
     choose_scenes(&s);

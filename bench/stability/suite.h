@@ -31,5 +31,8 @@ void stability_tap(cell *c);
 /* Those of resting.c. */
 void stability_sleep_and_wake(cell *c);
 void stability_pool_with_a_drop(cell *c);
+/* Those of rungs.c. */
+void stability_budget(cell *c);
+void stability_seam(cell *c);
 
 #endif

@@ -32,7 +32,15 @@ typedef struct ascc_method_scene {
     size_t body_count;           /* wall points of a body that moves: the last so many */
     double body_center[3];       /* what it turns about, and takes along */
     double sleep_speed;          /* fluid slower than this stops, if the method can; 0 = none */
+    const char *
+        below; /* a cheaper model for frames that may not cost more, if the method has one; or NULL */
 } ascc_method_scene;
+
+/** What a method chose that has a cheaper model below its own. */
+typedef struct ascc_method_choices {
+    bool below;             /* the last frame ran on it */
+    uint64_t changes, late; /* so far; frames that cost more than they might */
+} ascc_method_choices;
 
 /** Why a method failed. */
 typedef struct ascc_method_error {
@@ -68,6 +76,13 @@ typedef struct ascc_method {
                       ascc_method_error *error);
     /* Particles that sleep after the last frame; NULL if the method knows no sleep. */
     size_t (*asleep)(const void *state);
+    /* With a model below: what a frame may cost from now on, in particles that the method's own model steps; each that
+     * the one below steps counts as a third of one. Any cost until the first call. Which of the two ran. And how much
+     * of each particle the method's own computes while the one below runs, from 0 to 1, [fluid_count]. All NULL if the
+     * method has no cheaper model. */
+    bool (*set_budget)(void *state, double particles, ascc_method_error *error);
+    void (*choices)(const void *state, ascc_method_choices *choices);
+    bool (*set_detail)(void *state, const double *weight, ascc_method_error *error);
     void (*close)(void *state);
 } ascc_method;
 

@@ -10,11 +10,18 @@
 #include "host.h"
 #include "method.h"
 
+enum { RUNGS = 2 };
+#define BELOW (1.0 / 3.0) /* what a particle costs there */
+
 typedef struct learned {
     const ascc_method_scene *scene;
     ascc_context *context;
     ascc_model *model;
-    ascc_step *step;
+    ascc_step *step; /* or, with a model below: */
+    ascc_model *below;
+    ascc_ladder *ladder;
+    double work,
+        seen[RUNGS]; /* what the ladder's clock counts, and the rungs' own times when it last looked */
     ascc_particles *particles;
     double time_step; /* of the model */
     int32_t body;     /* of the scene's body, which has a frame of its own */
@@ -35,7 +42,9 @@ static void learned_close(void *state)
     learned *m = state;
     ascc_particles_destroy(&m->particles);
     ascc_step_destroy(&m->step);
+    ascc_ladder_destroy(&m->ladder);
     ascc_model_destroy(&m->model);
+    ascc_model_destroy(&m->below);
     ascc_context_destroy(&m->context);
     free(m);
 }
@@ -63,6 +72,21 @@ static bool learned_load(learned *m, const char *path, ascc_method_error *error)
     return true;
 }
 
+/* The model below: in the folder of the model's own file, or by name. */
+static bool load_below(learned *m, const char *path, ascc_method_error *error)
+{
+    const char *slash = strrchr(path, '/'), *name = m->scene->below;
+    const int folder = slash ? (int)(slash + 1 - path) : 0;
+    ascc_host_error why;
+    char beside[ASCC_HOST_PATH];
+    snprintf(beside, sizeof beside, "%.*s%s.safetensors", folder, path, name);
+    if (ascc_host_load(m->context, beside, &m->below, &why) == ASCC_OK ||
+        ascc_host_load(m->context, name, &m->below, &why) == ASCC_OK)
+        return true;
+    snprintf(error->text, sizeof error->text, "model below: %.220s", why.text);
+    return false;
+}
+
 static bool learned_open(const char *settings, const ascc_method_scene *scene, void **state,
                          ascc_method_error *error)
 {
@@ -72,7 +96,7 @@ static bool learned_open(const char *settings, const ascc_method_scene *scene, v
         return false;
     }
     m->scene = scene;
-    if (!learned_load(m, settings, error)) {
+    if (!learned_load(m, settings, error) || (scene->below && !load_below(m, settings, error))) {
         learned_close(m);
         return false;
     }
@@ -133,6 +157,40 @@ static ascc_status learned_fill(learned *m, const double *position, const double
     return status;
 }
 
+/* The step that ran last. */
+static const ascc_step *step_of(const learned *m)
+{
+    ascc_ladder_statistics told = {.size = sizeof told};
+    if (!m->ladder)
+        return m->step;
+    (void)ascc_ladder_get_statistics(m->ladder, &told);
+    return ascc_ladder_step(m->ladder, told.rung);
+}
+
+/* Counts particles that were stepped, so that choices are the same on every machine: a rung whose own time has gone
+ * on has run. */
+static double count_work(void *user)
+{
+    learned *m = user;
+    for (int32_t r = 0; r < RUNGS && m->ladder; r++) {
+        ascc_step_statistics told = {.size = sizeof told};
+        (void)ascc_step_get_statistics(ascc_ladder_step(m->ladder, r), &told);
+        if (told.seconds_total != m->seen[r] && told.steps > 0)
+            m->work += (r ? 1.0 : BELOW) * (double)m->scene->fluid_count;
+        m->seen[r] = told.seconds_total;
+    }
+    return m->work;
+}
+
+static ascc_status make_step(learned *m, const ascc_step_options *options)
+{
+    const ascc_model *models[RUNGS] = {m->below, m->model};
+    const ascc_ladder_options ladder = {
+        .size = sizeof ladder, .clock = count_work, .user = m, .step = options};
+    return m->below ? ascc_ladder_create(m->context, RUNGS, models, &ladder, &m->ladder)
+                    : ascc_step_create(m->context, m->model, options, &m->step);
+}
+
 /* Everything anew, so that nothing of an earlier start can reach this one. */
 static bool learned_set(void *state, const double *position, const double *velocity,
                         ascc_velocity_kind kind, ascc_method_error *error)
@@ -149,7 +207,7 @@ static bool learned_set(void *state, const double *position, const double *veloc
     (void)kind;
     m->driven = false;
     ascc_particles_destroy(&m->particles);
-    if (!m->step && ascc_step_create(m->context, m->model, &step, &m->step) != ASCC_OK)
+    if (!m->step && !m->ladder && make_step(m, &step) != ASCC_OK)
         return context_failed(m, "step", error);
     if (ascc_particles_create(m->context, &particles, &m->particles) != ASCC_OK)
         return context_failed(m, "particles", error);
@@ -198,8 +256,11 @@ static bool learned_advance(void *state, ascc_method_error *error)
     learned *m = state;
     const double still[3] = {0.0, 0.0, 0.0};
     const ascc_forces forces = {.size = sizeof forces, .gravity = m->scene->gravity};
-    if (ascc_step_run(m->step, m->particles, &forces, 1) != ASCC_OK) {
-        snprintf(error->text, sizeof error->text, "%s", ascc_step_message(m->step));
+    const ascc_status status = m->ladder ? ascc_ladder_run(m->ladder, m->particles, &forces, 1)
+                                         : ascc_step_run(m->step, m->particles, &forces, 1);
+    if (status != ASCC_OK) {
+        snprintf(error->text, sizeof error->text, "%s",
+                 m->ladder ? ascc_ladder_message(m->ladder) : ascc_step_message(m->step));
         return false;
     }
     const bool stops = m->driven;
@@ -221,7 +282,7 @@ static void learned_impulses(const void *state, double external[3], double wall[
     const learned *m = state;
     const double quantum = ascc_particles_momentum_quantum(m->particles);
     ascc_step_statistics statistics = {.size = sizeof statistics};
-    (void)ascc_step_get_statistics(m->step, &statistics);
+    (void)ascc_step_get_statistics(step_of(m), &statistics);
     for (int c = 0; c < 3; c++) {
         external[c] = (double)statistics.external_impulse[c] * quantum;
         wall[c] = (double)statistics.wall_impulse[c] * quantum;
@@ -250,7 +311,7 @@ static size_t learned_asleep(const void *state)
 {
     const learned *m = state;
     ascc_step_statistics told = {.size = sizeof told};
-    return ascc_step_get_statistics(m->step, &told) == ASCC_OK ? (size_t)told.asleep : 0;
+    return ascc_step_get_statistics(step_of(m), &told) == ASCC_OK ? (size_t)told.asleep : 0;
 }
 
 static bool learned_add_fluid(void *state, size_t count, const double *position,
@@ -258,6 +319,34 @@ static bool learned_add_fluid(void *state, size_t count, const double *position,
 {
     learned *m = state;
     if (add_fluid(m, count, position, velocity) == ASCC_OK)
+        return true;
+    snprintf(error->text, sizeof error->text, "%s", ascc_particles_message(m->particles));
+    return false;
+}
+
+static bool learned_set_budget(void *state, double particles, ascc_method_error *error)
+{
+    learned *m = state;
+    if (ascc_ladder_set_budget(m->ladder, particles) == ASCC_OK)
+        return true;
+    snprintf(error->text, sizeof error->text, "%s", ascc_ladder_message(m->ladder));
+    return false;
+}
+
+static void learned_choices(const void *state, ascc_method_choices *choices)
+{
+    const learned *m = state;
+    ascc_ladder_statistics told = {.size = sizeof told};
+    (void)ascc_ladder_get_statistics(m->ladder, &told);
+    *choices = (ascc_method_choices){told.rung == 0, told.changes, told.late};
+}
+
+static bool learned_set_detail(void *state, const double *weight, ascc_method_error *error)
+{
+    learned *m = state;
+    const ascc_const_array rows = {.data = weight, .scalar = ASCC_DOUBLE};
+    if (ascc_particles_set(m->particles, ASCC_FLUID, ASCC_DETAIL, 0, m->scene->fluid_count,
+                           &rows) == ASCC_OK)
         return true;
     snprintf(error->text, sizeof error->text, "%s", ascc_particles_message(m->particles));
     return false;
@@ -277,5 +366,8 @@ const ascc_method ascc_method_model = {
     .body_impulse = learned_body_impulse,
     .add_fluid = learned_add_fluid,
     .asleep = learned_asleep,
+    .set_budget = learned_set_budget,
+    .choices = learned_choices,
+    .set_detail = learned_set_detail,
     .close = learned_close,
 };
