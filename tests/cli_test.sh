@@ -233,6 +233,17 @@ holds 'a ladder falls back where a network is far from its training' grep -q '^ 
 holds 'and says so' grep -q '^trust  *none in a network now' out
 run sim pbf2d.safetensors dam-break-2d --size 8 -n 5 --trust 0
 holds 'a model without a network says that it cannot tell' grep -q '^from training  *the model has no statistics' out
+run sim --ladder pbf2d.safetensors,water2d.safetensors --detail surface:9 dam-break-2d --size 8 -n 20 --ply detailed
+holds 'where all is detail the best model moves it' diff -r detailed alone
+run sim pbf2d.safetensors dam-break-2d --size 8 -n 20 --ply first
+run sim --ladder pbf2d.safetensors,water2d.safetensors --detail near:99,99,0.1 dam-break-2d --size 8 -n 20 --ply elsewhere
+holds 'where none is the first one does' diff -r elsewhere first
+run sim --ladder "$root/examples/models/water2d-tiny.safetensors,water2d.safetensors" --detail fast:0.4+near:0.1,0.05,0.03 dam-break-2d --size 16 -n 20
+holds 'part of the fluid may be detail' grep -qE '^detail  *[1-9][0-9.]* % of the fluid by water2d' out
+holds 'and momentum is exact across the seam' grep -q '^momentum error  *0  (0 0 0 quanta' out
+refuses 1 'their relaxations differ in support or rest volume' sim --ladder pbf2d.safetensors,water2d.safetensors --detail surface:0.02 dam-break-2d -n 1
+refuses 2 '--detail takes a --ladder' sim demo dam-break-2d -n 1 --detail fast:1
+refuses 1 'near:X,Y,R, fast:V and surface:D are known' sim --ladder pbf2d.safetensors,water2d.safetensors --detail near:1,2 dam-break-2d -n 1
 refuses 2 '--trust takes a number from 0' sim demo dam-break-2d -n 1 --trust far
 refuses 1 'has no statistics of its training' sim --ladder "$root/examples/models/pbf3d.safetensors,$root/examples/models/paper3d.safetensors" --trust 1 dam-break-3d -n 1
 refuses 2 'a MODEL, a SEQUENCE and -o are wanted' trust water2d.safetensors -o t.safetensors

@@ -1,6 +1,7 @@
 /* A better network where detail is wanted: momentum, bits, and what each network gives. SPDX-License-Identifier: MIT */
 #include <math.h>
 
+#include "detail.h"
 #include "step/ladder.h"
 #include "support/counting.h"
 #include "support/model_builder.h"
@@ -516,6 +517,58 @@ static void without_memory_nothing_changes_and_nothing_leaks(void **state)
     }
 }
 
+/* ---- What the program asks for ---- */
+
+static void the_program_weighs_place_speed_and_depth(void **state)
+{
+    (void)state;
+    enum { ROWS = 40 };
+    float x[ROWS][2], v[ROWS][2];
+    double weight[ROWS];
+    ascc_detail detail;
+    for (int i = 0; i < ROWS; i++) { /* two columns of 20, the second at speeds that rise */
+        x[i][0] = i < 20 ? 0.0f : 1.0f;
+        x[i][1] = 0.05f * (float)(i % 20);
+        v[i][0] = i < 20 ? 0.0f : 0.1f * (float)(i - 20);
+        v[i][1] = 0.0f;
+    }
+    const ascc_detail_fluid fluid = {.dimension = 2,
+                                     .count = ROWS,
+                                     .position = x[0],
+                                     .velocity = v[0],
+                                     .spacing = 0.05,
+                                     .gravity = {0.0, -9.81, 0.0}};
+    assert_true(ascc_detail_read("fast:1", 2, &detail));
+    assert_true(ascc_detail_weigh(&detail, &fluid, weight));
+    for (int i = 0; i < ROWS; i++) /* 0 up to half of it, 1 from it on */
+        assert_true(fabs(weight[i] - fmin(1.0, fmax(0.0, 2.0 * (double)v[i][0] - 1.0))) < 1e-12);
+    assert_true(ascc_detail_read("surface:0.2", 2, &detail));
+    assert_true(ascc_detail_weigh(&detail, &fluid, weight));
+    for (int i = 0; i < ROWS; i++) /* of depths 0 to 0.95: 1 to 0.2, 0 from 0.4 on */
+        assert_true(fabs(weight[i] -
+                         fmin(1.0, fmax(0.0, 1.0 - (0.95 - (double)x[i][1] - 0.2) / 0.2))) < 1e-5);
+    assert_true(ascc_detail_read("near:1,0.5,0.1+fast:1e9", 2, &detail));
+    assert_true(ascc_detail_weigh(&detail, &fluid, weight));
+    for (int i = 0; i < ROWS; i++) {
+        const double far = hypot((double)x[i][0] - 1.0, (double)x[i][1] - 0.5) - 0.1;
+        assert_true(fabs(weight[i] - fmin(1.0, fmax(0.0, 1.0 - far / 0.2))) < 1e-12);
+    }
+}
+
+static void texts_that_say_nothing_are_refused(void **state)
+{
+    (void)state;
+    static const char *const bad[] = {
+        "",       "near",    "near:",   "near:1,2", "near:1,2,3,4", "near:1,2,0",
+        "fast:",  "fast:0",  "fast:-1", "fast:nan", "fast:1,2",     "surface:x",
+        "deep:1", "fast:1+", "+fast:1", "fast:1 ",  "fast:1+fast",  "surface:inf"};
+    ascc_detail detail;
+    for (size_t k = 0; k < sizeof bad / sizeof *bad; k++)
+        if (ascc_detail_read(bad[k], 2, &detail))
+            fail_msg("'%s' is taken", bad[k]);
+    assert_true(ascc_detail_read("near:1,2,3,4", 3, &detail));
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -531,6 +584,8 @@ int main(void)
         cmocka_unit_test(a_run_goes_on_from_a_snapshot_to_the_same_bits),
         cmocka_unit_test(models_that_cannot_share_a_step_are_refused_by_name),
         cmocka_unit_test(without_memory_nothing_changes_and_nothing_leaks),
+        cmocka_unit_test(the_program_weighs_place_speed_and_depth),
+        cmocka_unit_test(texts_that_say_nothing_are_refused),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

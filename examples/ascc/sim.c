@@ -9,6 +9,7 @@
 #include "arguments.h"
 #include "commands.h"
 #include "console.h"
+#include "detail.h"
 #include "frames.h"
 #include "host.h"
 #include "new_file.h"
@@ -20,8 +21,9 @@
 
 typedef struct options {
     const char *model, *scene, *out, *frames, *ply, *vtk;
-    const char *rungs; /* models by name, commas between them, in place of one */
-    double budget;     /* ms a step, 0 = none */
+    const char *rungs;  /* models by name, commas between them, in place of one */
+    double budget;      /* ms a step, 0 = none */
+    const char *detail; /* where the best of them is wanted; NULL = as the budget says */
     int32_t steps, every, threads, size;
     double time_step, spacing, sleep_speed, max_distance;
     bool trust;            /* measured */
@@ -55,6 +57,10 @@ static void usage(FILE *to)
         "  --ladder M,M...    several models, the best last: each step runs the best that the\n"
         "                     budget allows\n"
         "  --budget MS        milliseconds that a step may take, for --ladder\n"
+        "  --detail WHERE     with --ladder: fluid there is the best model's, the rest the first\n"
+        "                     one's, or what the budget allows: near:X,Y,Z,R (metres), fast:V "
+        "(m/s),\n"
+        "                     surface:D (metres below it); several with + between them\n"
         "  --sleep V          parts of the fluid slower than V times what gravity gives in a\n"
         "                     step stop until something wakes them (0 = none)\n"
         "  --trust X          tells how far what the model sees is from what it was trained on;\n"
@@ -69,7 +75,7 @@ static void usage(FILE *to)
 static const char *const option_names[] = {
     "-n",        "-o",       "--frames",  "--ply",   "--vtk",     "--every",
     "--threads", "--dt",     "--gravity", "--size",  "--spacing", "--velocity",
-    "--sleep",   "--ladder", "--budget",  "--trust", NULL};
+    "--sleep",   "--ladder", "--budget",  "--trust", "--detail",  NULL};
 
 static bool bad_use(const char *what, const char *value)
 {
@@ -124,6 +130,8 @@ static bool read_option(options *o, const char *name, const char *value)
         return (o->rungs = value) != NULL;
     if (strcmp(name, "--budget") == 0)
         return ascc_read_real("sim", name, value, 1e-3, 1e9, &o->budget);
+    if (strcmp(name, "--detail") == 0)
+        return (o->detail = value) != NULL;
     if (strcmp(name, "--gravity") == 0)
         return vector(name, value, o->gravity, &o->gravity_count);
     if (strcmp(name, "--velocity") == 0 && strcmp(value, "stored") == 0)
@@ -175,6 +183,8 @@ static bool read_arguments(options *o, int argc, char **argv)
         return bad_use(o->rungs ? "SCENE is wanted" : "MODEL and SCENE are wanted", NULL);
     if (o->budget > 0.0 && !o->rungs)
         return bad_use("--budget takes a --ladder", NULL);
+    if (o->detail && !o->rungs)
+        return bad_use("--detail takes a --ladder", NULL);
     return o->steps > 0 || bad_use("-n STEPS is wanted", NULL);
 }
 
@@ -224,9 +234,13 @@ typedef struct simulation {
     ascc_ladder *ladder;       /* which was told */
     ascc_sequence_writer *writer;
     ascc_frames exported;
+    ascc_detail detail;
+    double *weight; /* with --detail */
     float *position, *velocity;
     uint64_t *id;
     double time_step;
+    uint64_t detailed; /* particles of all steps that the best model computed; of what all had */
+    uint64_t stepped;
     /* Sums over the run. */
     int32_t steps;
     double seconds[ASCC_MAX_STAGES], seconds_total;
@@ -309,8 +323,37 @@ static void add_distance(simulation *s, uint64_t count, double mean, double wors
     s->distance_worst = fmax(s->distance_worst, worst);
 }
 
+/* Weights of the fluid as it is. */
+static ascc_status set_detail(simulation *s)
+{
+    const double *g = s->o->gravity_count ? s->o->gravity : s->scene.gravity;
+    ascc_detail_fluid fluid = {.dimension = s->scene.dimension,
+                               .count = s->scene.count,
+                               .position = s->position,
+                               .velocity = s->velocity,
+                               .spacing = 2.0 * s->scene.radius};
+    const ascc_const_array rows = {.data = s->weight, .scalar = ASCC_DOUBLE};
+    memcpy(fluid.gravity, g, sizeof fluid.gravity);
+    if (!read_state(s) || !ascc_detail_weigh(&s->detail, &fluid, s->weight))
+        return ASCC_ERROR_MEMORY;
+    return ascc_particles_set(s->particles, ASCC_FLUID, ASCC_DETAIL, 0, s->scene.count, &rows);
+}
+
+/* Without a budget the first rung runs where no detail is wanted. */
+static ascc_status run_detailed(simulation *s, const ascc_forces *forces)
+{
+    const int32_t first = 0;
+    const ascc_status status = set_detail(s);
+    if (status != ASCC_OK)
+        return status;
+    return s->o->budget > 0.0 ? ascc_ladder_run(s->ladder, s->particles, forces, 1)
+                              : ascc_ladder_replay(s->ladder, s->particles, forces, &first, 1);
+}
+
 static ascc_status run_step(simulation *s, const ascc_forces *forces)
 {
+    if (s->weight)
+        return run_detailed(s, forces);
     return s->ladder ? ascc_ladder_run(s->ladder, s->particles, forces, 1)
                      : ascc_spread_run(s->spread, s->step, forces);
 }
@@ -327,6 +370,10 @@ static void count_step(simulation *s)
         add_stage(s, &t.stage[i]);
     s->seconds_total += t.seconds_total;
     s->asleep = t.asleep;
+    if (s->ladder) {
+        s->detailed += l.particles_on[l.rung_count - 1];
+        s->stepped += s->scene.count;
+    }
     add_distance(s, t.distance_count, t.distance_mean, t.distance_worst);
     for (int c = 0; c < 3; c++)
         s->drift[c] += t.momentum_before[c] + t.external_impulse[c] - t.wall_impulse[c] -
@@ -446,6 +493,9 @@ static void print_ladder(const simulation *s)
     for (int32_t r = 0; r < l.rung_count; r++)
         ascc_line(stdout, "  %-17s %9" PRIu64 " steps, %.3f ms expected now", s->rung_name[r],
                   l.steps_on[r], 1e3 * l.predicted[r]);
+    if (s->weight)
+        ascc_line(stdout, "detail              %.1f %% of the fluid by %s",
+                  100.0 * (double)s->detailed / (double)s->stepped, s->rung_name[l.rung_count - 1]);
     ascc_line(stdout, "changes of model    %" PRIu64 ", at most one a second simulated", l.changes);
     if (l.reason == ASCC_LADDER_STRANGE)
         ascc_line(stdout, "trust               none in a network now: too far from its training");
@@ -586,6 +636,11 @@ static bool open_both(simulation *s)
         (void)snprintf(s->error, sizeof s->error, "%s: there is no fluid", o->scene);
     else if (o->rungs && ascc_processes_count() > 1)
         (void)snprintf(s->error, sizeof s->error, "a --ladder runs on one process");
+    else if (o->detail && !ascc_detail_read(o->detail, s->scene.dimension, &s->detail))
+        (void)snprintf(
+            s->error, sizeof s->error,
+            "--detail %s: near:X,Y%s,R, fast:V and surface:D are known, with + between them",
+            o->detail, s->scene.dimension == 3 ? ",Z" : "");
     s->time_step = o->time_step > 0.0 ? o->time_step : info.time_step;
     return !s->error[0];
 }
@@ -639,7 +694,9 @@ static bool open_outputs(simulation *s)
     s->position = malloc(floats * sizeof *s->position);
     s->velocity = malloc(floats * sizeof *s->velocity);
     s->id = malloc((s->scene.count + 1) * sizeof *s->id);
-    if (!s->position || !s->velocity || !s->id) {
+    if (s->o->detail)
+        s->weight = malloc((s->scene.count + 1) * sizeof *s->weight);
+    if (!s->position || !s->velocity || !s->id || (s->o->detail && !s->weight)) {
         (void)snprintf(s->error, sizeof s->error, "no memory for %zu particles", s->scene.count);
         return false;
     }
@@ -676,6 +733,7 @@ static void close_all(simulation *s)
         ascc_model_destroy(&s->rung[r]);
     ascc_context_destroy(&s->context);
     ascc_sequence_free(&s->scene);
+    free(s->weight);
     free(s->position);
     free(s->velocity);
     free(s->id);

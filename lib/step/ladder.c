@@ -303,7 +303,7 @@ static void note(ascc_ladder *ladder, int32_t rung, double seconds)
             (ascc_rung_change){.step = ascc_ladder_step_count(ladder), .rung = rung};
     }
     s->steps_on[rung]++;
-    s->rung = rung;
+    s->rung = ladder->ran;
     s->seconds = seconds;
     s->late += ladder->budget > 0.0 && seconds > ladder->budget;
 }
