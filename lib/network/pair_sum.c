@@ -204,32 +204,6 @@ static void evaluate_chunks(void *data, size_t begin, size_t end, int32_t slot)
     }
 }
 
-/* The farthest that two neighbours are apart in the order of rows. Where slots are rows, neighbours
- * ascend, so the first and the last tell. */
-static void measure_rows(void *data, size_t begin, size_t end, int32_t slot)
-{
-    (void)slot;
-    ascc_pair_sum *sum = data;
-    const ascc_rows *rows = sum->rows;
-    const bool ascending = rows->source_grid->order == NULL;
-    size_t reach = 1;
-    for (size_t i = begin; i < end; i++) {
-        if (!sum->fluid[i] || is_idle(sum, i))
-            continue;
-        const uint32_t *neighbor = rows->neighbor + rows->start[i];
-        const size_t count = rows->count[i], stride = ascending && count > 1 ? count - 1 : 1;
-        for (size_t k = 0; k < count; k += stride) {
-            const size_t j = neighbor[k], apart = j > i ? j - i : i - j;
-            reach = apart > reach ? apart : reach;
-        }
-    }
-    size_t seen = atomic_load_explicit(&sum->reach, memory_order_relaxed);
-    while (seen < reach &&
-           !atomic_compare_exchange_weak_explicit(&sum->reach, &seen, reach, memory_order_relaxed,
-                                                  memory_order_relaxed))
-        ;
-}
-
 /* Rows of a chunk, at least `least`: in each of the three phases as many chunks for one worker as for
  * another, if that leaves any. Sums are integers, so where chunks end does not matter. */
 static size_t chunk_size(size_t count, size_t least, size_t workers)
@@ -244,9 +218,7 @@ void ascc_pair_sum_run(ascc_pair_sum *sum, const ascc_rows *rows, ascc_pair_func
     const size_t count = rows->query->count;
     sum->rows = rows;
     sum->evaluate = evaluate;
-    atomic_store(&sum->reach, 0);
-    ascc_workers_run(workers, count, 1024, measure_rows, sum);
-    sum->chunk = chunk_size(count, ascc_max_size(atomic_load(&sum->reach), SMALLEST_CHUNK),
+    sum->chunk = chunk_size(count, ascc_max_size(rows->span, SMALLEST_CHUNK),
                             (size_t)ascc_workers_count(workers));
     const size_t chunks = (count + sum->chunk - 1) / sum->chunk;
     for (sum->phase = 0; sum->phase < 3 && sum->phase < chunks; sum->phase++)

@@ -65,7 +65,6 @@ typedef struct ascc_pair_sum {
     bool skip_coincident;
     size_t chunk, phase;
     atomic_uint_least64_t pairs;
-    atomic_size_t reach;   /* rows that neighbours are apart at most */
     atomic_size_t bad_row; /* 1 + smallest set row with an impulse that cannot be held */
 } ascc_pair_sum;
 

@@ -13,6 +13,7 @@ ascc_status ascc_rows_open(ascc_rows *rows, const ascc_search_tools *tools, size
     const size_t count = rows->query->count;
     rows->used = rows->capacity = rows->stored = 0;
     rows->longest = 0;
+    rows->span = 0;
     rows->count = ascc_arena_take(tools->arena, count, sizeof *rows->count);
     rows->start = ascc_arena_take(tools->arena, count, sizeof *rows->start);
     if (!rows->count || !rows->start)
@@ -53,7 +54,7 @@ typedef struct rows_job {
     atomic_size_t used;
     atomic_uint crowded; /* 1 + a query with too many neighbours */
     atomic_uint longest;
-    atomic_size_t stored;
+    atomic_size_t stored, span;
 } rows_job;
 
 static void low_words(const ascc_points *points, size_t row, int32_t at[3])
@@ -237,11 +238,23 @@ static bool search_around(const searcher *s, const surroundings *around, const i
 /* Neighbours a worker sets aside at once, so that threads seldom meet at the counter. */
 #define SET_ASIDE 512
 
-/* What a worker has set aside and not used; its longest list, and all it stored. */
+/* What a worker has set aside and not used; its longest list, the widest, and all it stored. */
 typedef struct room {
     size_t next, end;
-    size_t longest, stored;
+    size_t longest, stored, span;
 } room;
+
+/* How far in the order of rows a list goes. Where slots are rows, it ascends: its ends tell. */
+static size_t span_of(const ascc_rows *rows, size_t query, const uint32_t *found, size_t count)
+{
+    const size_t step = rows->source_grid->order || count < 2 ? 1 : count - 1;
+    size_t span = 0;
+    for (size_t k = 0; rows->same && k < count; k += step) {
+        const size_t j = found[k];
+        span = ascc_max_size(span, j > query ? j - query : query - j);
+    }
+    return span;
+}
 
 /* Copies a finished list to its place, if there is one; else it is made again. */
 static void store_row(rows_job *job, room *r, size_t query, const uint32_t *found, size_t count)
@@ -261,11 +274,17 @@ static void store_row(rows_job *job, room *r, size_t query, const uint32_t *foun
     rows->count[query] = (uint32_t)count;
     r->longest = ascc_max_size(r->longest, count);
     r->stored += count;
+    r->span = ascc_max_size(r->span, span_of(rows, query, found, count));
 }
 
 static void tell(rows_job *job, const room *r)
 {
     atomic_fetch_add_explicit(&job->stored, r->stored, memory_order_relaxed);
+    size_t span = atomic_load_explicit(&job->span, memory_order_relaxed);
+    while (span < r->span &&
+           !atomic_compare_exchange_weak_explicit(&job->span, &span, r->span, memory_order_relaxed,
+                                                  memory_order_relaxed))
+        ;
     unsigned seen = atomic_load_explicit(&job->longest, memory_order_relaxed);
     while (seen < r->longest &&
            !atomic_compare_exchange_weak_explicit(&job->longest, &seen, (unsigned)r->longest,
@@ -330,7 +349,7 @@ static void make_rows(void *data, size_t begin, size_t end, int32_t slot)
     distance *heap = rows->limit ? job->heap + (size_t)slot * (size_t)rows->limit : NULL;
     const searcher search = searcher_of(job);
     surroundings around = {.count = 0};
-    room set_aside = {0, 0, 0, 0};
+    room set_aside = {0};
     for (size_t c = begin; c < end; c++) {
         around.count = 0;
         for (size_t s = grid->start[c]; s < grid->start[c + 1]; s++) {
@@ -427,6 +446,7 @@ ascc_status ascc_rows_make(ascc_rows *rows, const ascc_search_tools *tools, cons
     rows->used = needed;
     rows->longest = (uint32_t)ascc_max_size(rows->longest, atomic_load(&job.longest));
     rows->stored += atomic_load(&job.stored);
+    rows->span = ascc_max_size(rows->span, atomic_load(&job.span));
     if (mutual)
         ascc_workers_run(tools->workers, rows->query->count, 256, drop_one_sided, &job);
     ascc_arena_return(tools->arena, mark);

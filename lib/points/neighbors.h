@@ -31,6 +31,7 @@ typedef struct ascc_rows {
     size_t capacity, used; /* entries there is room for, and set aside */
     size_t stored;         /* entries that lists hold */
     uint32_t longest;      /* list */
+    size_t span; /* if query and source are one set: rows that neighbours are apart at most */
 } ascc_rows;
 
 /* Room for all lists, none of them made. expected: neighbours to make room for at first; 0 = count them first. */
