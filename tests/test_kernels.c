@@ -1299,7 +1299,8 @@ static void roughness_equals_doubles_and_has_the_same_bits_on_every_cpu(void **s
     ascc_kernels table[16];
     const int count = tables(table);
     const ascc_gradients pairs = random_gradients();
-    static float move[ROWS * 4], rough[ROWS * 4], first[ROWS * 4];
+    static float move[ROWS * 4], rough[ROWS * 4], again[ROWS * 4], first[ROWS * 4];
+    static float weight[ROWS * LONGEST];
     static double want[ROWS][3], impulse[ROWS][3];
     static int64_t given[ROWS * 4], first_given[ROWS * 4];
     for (size_t i = 0; i < ROWS * 4; i++)
@@ -1316,14 +1317,18 @@ static void roughness_equals_doubles_and_has_the_same_bits_on_every_cpu(void **s
             }
         }
     for (int t = 0; t < count; t++) {
-        table[t].roughness(&pairs, 0, 33, move, rough);
-        table[t].roughness(&pairs, 33, ROWS, move, rough);
+        ascc_gradients weighed = pairs;
+        weighed.weight = weight;
+        table[t].roughness(&pairs, 0, 33, move, weight, rough);
+        table[t].roughness(&pairs, 33, ROWS, move, weight, rough);
+        table[t].roughness(&weighed, 0, ROWS, move, NULL, again);
+        check_same_bits(rough, again, ROWS * 4, "roughness by weights");
         memset(given, 0, sizeof given);
         for (size_t i = 0; i < ROWS; i++)
-            assert_int_equal(table[t].rough_impulses(&pairs, move, 1e9, i, 0x1p50, given), 1);
+            assert_int_equal(table[t].rough_impulses(&weighed, move, 1e9, i, 0x1p50, given), 1);
         /* 88 terms of at most 6, a chain of 11 and some roundings of each */
         for (size_t i = 0; i < ROWS * 4; i++) {
-            assert_true(i % 4 == 3 ? rough[i] == move[i]
+            assert_true(i % 4 == 3 ? rough[i] == 0.0f
                                    : fabs((double)rough[i] - want[i / 4][i % 4]) <
                                          88.0 * 6.0 * 20.0 * 0x1p-24);
             assert_true(i % 4 == 3 ? given[i] == 0
@@ -1336,7 +1341,7 @@ static void roughness_equals_doubles_and_has_the_same_bits_on_every_cpu(void **s
         }
         check_same_bits(first, rough, ROWS * 4, "roughness");
         assert_memory_equal(first_given, given, sizeof given);
-        assert_int_equal(table[t].rough_impulses(&pairs, move, 1e9, 0, 1.0, given), 0);
+        assert_int_equal(table[t].rough_impulses(&weighed, move, 1e9, 0, 1.0, given), 0);
     }
 }
 

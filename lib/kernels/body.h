@@ -1213,37 +1213,45 @@ static int pressure_impulses(const ascc_gradients *pairs, const ascc_pressures *
     return good;
 }
 
-/* Differences of the velocities of a row and of its pairs, by |g|^2 and the smaller coefficient of both. */
-static inline void weighted_differences(const ascc_gradients *pairs, size_t k, const float *row,
-                                        const float *move, vector difference[3])
+/* Differences between a row and eight of its pairs; v: these. */
+static inline void differences(const ascc_gradients *pairs, size_t k, const float *row,
+                               const float *move, vector v[4], vector difference[3])
 {
     const float *from[LANES];
-    vector v[4], square = fill(0.0f);
     for (size_t l = 0; l < LANES; l++)
         from[l] = move + (size_t)pairs->neighbor[k + l] * 4;
     load_quads(from, v);
+    for (size_t c = 0; c < 3; c++)
+        difference[c] = minus(fill(row[c]), v[c]);
+}
+
+static inline vector weight_of(const ascc_gradients *pairs, size_t k, float own, vector others)
+{
+    vector square = fill(0.0f);
     for (size_t c = 0; c < 3; c++) {
         const vector g = load(pairs->g[c] + k);
         square = fused(g, g, square);
     }
-    const vector weight = times(square, smaller(fill(row[3]), v[3]));
-    for (size_t c = 0; c < 3; c++)
-        difference[c] = times(weight, minus(fill(row[c]), v[c]));
+    return times(square, smaller(fill(own), others));
 }
 
 static void roughness(const ascc_gradients *pairs, size_t begin, size_t end, const float *move,
-                      float *rough)
+                      float *weigh, float *rough)
 {
     for (size_t i = begin; i < end; i++) {
-        vector x = fill(0.0f), y = x, z = x, d[3];
+        vector x = fill(0.0f), y = x, z = x, v[4], d[3];
         for (size_t k = pairs->start[i]; k < pairs->end[i]; k += LANES) {
-            weighted_differences(pairs, k, move + i * 4, move, d);
-            x = add(x, d[0]);
-            y = add(y, d[1]);
-            z = add(z, d[2]);
+            differences(pairs, k, move + i * 4, move, v, d);
+            const vector weight =
+                weigh ? weight_of(pairs, k, move[i * 4 + 3], v[3]) : load(pairs->weight + k);
+            if (weigh)
+                store(weigh + k, weight);
+            x = add(x, times(weight, d[0]));
+            y = add(y, times(weight, d[1]));
+            z = add(z, times(weight, d[2]));
         }
         store_totals(rough + i * 4, x, y, z);
-        rough[i * 4 + 3] = move[i * 4 + 3];
+        rough[i * 4 + 3] = 0.0f;
     }
 }
 
@@ -1260,11 +1268,12 @@ static int rough_impulses(const ascc_gradients *pairs, const float *rough, doubl
         size_t n = 0;
         for (size_t i = k; i < stop; i += LANES) {
             const kept after = kept_lanes(above(pairs->neighbor + i, (uint32_t)row));
-            vector d[3];
-            weighted_differences(pairs, i, rough + row * 4, rough, d);
+            const vector weight = load(pairs->weight + i);
+            vector v[4], d[3];
+            differences(pairs, i, rough + row * 4, rough, v, d);
             store_kept_integers(near + n, pairs->neighbor + i, after);
             for (size_t c = 0; c < 3; c++)
-                store_kept(term[c] + n, d[c], after);
+                store_kept(term[c] + n, times(weight, d[c]), after);
             n += after.count;
         }
         for (size_t c = 0; c < 3; c++)

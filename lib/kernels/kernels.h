@@ -189,14 +189,14 @@ typedef struct ascc_kernels {
     int (*pressure_impulses)(const ascc_gradients *pairs, const ascc_pressures *pressures,
                              size_t row, double limit, int64_t *sum);
 
-    /* Of rows [begin, end): rough[i][c] = sum over pairs of coefficient |g|^2 (move[i] - move[neighbor])[c], the
-     * coefficient the smaller of both rows' fourth numbers of move, which rough takes over. 8 partial sums by
-     * pair mod 8. Rows of move and rough are 4 wide. */
+    /* Of rows [begin, end): rough[i][c] = sum over pairs of weight (move[i] - move[neighbor])[c]. Weights are those
+     * of the pairs, or if weigh is not NULL |g|^2 times the smaller of both rows' fourth numbers of move, which is
+     * written there; it may be g[0]. 8 partial sums by pair mod 8. Rows of move and rough are 4 wide, the last of rough 0. */
     void (*roughness)(const ascc_gradients *pairs, size_t begin, size_t end, const float *move,
-                      float *rough);
+                      float *weigh, float *rough);
 
-    /* Pairs of a row with neighbours after it: impulses factor coefficient |g|^2 (rough[neighbor] - rough[row]),
-     * the coefficient as of roughness, added and taken as add_impulses does. */
+    /* Pairs of a row with neighbours after it: impulses factor weight (rough[neighbor] - rough[row]), added and taken
+     * as add_impulses does. */
     int (*rough_impulses)(const ascc_gradients *pairs, const float *rough, double factor,
                           size_t row, double limit, int64_t *sum);
 

@@ -9,6 +9,9 @@
  * The matrix of the first line, A, is symmetric with eigenvalues in [0, 2], and the second line is a diagonal F in
  * [0, 1]: so 1 - share A F A adds no energy for shares of at most a half. Of unequal masses the same holds with
  * min(m_i s_i, m_j s_j) and what each row receives divided by its mass.
+ *
+ * Weights stay as they are while sweeps go on, so a pair gives w_ij (S_i - S_j) in all, S the sum of share R over
+ * sweeps: velocities follow in floats, and impulses are rounded once, at the end.
  */
 #include "hyperviscosity.h"
 
@@ -21,8 +24,12 @@
 typedef struct sweep {
     const ascc_smoothing *of;
     double heaviest, factor; /* kg; quanta per support a step of roughness */
-    float bound;
-    float *velocity, *rough; /* rows of 4, the last the coefficient */
+    ascc_gradients pairs;    /* with weights, once they are known */
+    float *weigh;            /* else where they go */
+    float bound, share;
+    bool last;
+    /* Rows of 4: velocities and coefficients; R; S; what a sweep takes. */
+    float *velocity, *rough, *sum, *taken;
 } sweep;
 
 void ascc_relaxation_velocity(const ascc_step_state *state, size_t row, float velocity[4])
@@ -103,17 +110,24 @@ static void velocity_rows(void *data, size_t begin, size_t end, int32_t slot)
             s->sum->uniform ? s->coefficient[i]
                             : (float)((double)s->coefficient[i] * (s->sum->mass[i] / w->heaviest));
     }
+    memset(w->sum + begin * 4, 0, (end - begin) * 4 * sizeof *w->sum);
+}
+
+/* How much rows of `of` differ from those around, by their masses. */
+static void differ(const sweep *w, size_t begin, size_t end, const float *of, float *to)
+{
+    const ascc_smoothing *s = w->of;
+    s->state->tools.kernels->roughness(&w->pairs, begin, end, of, w->weigh, to);
+    for (size_t i = begin; !s->sum->uniform && i < end; i++)
+        for (size_t c = 0; c < 3; c++)
+            to[i * 4 + c] *= (float)(w->heaviest / s->sum->mass[i]);
 }
 
 static void rough_rows(void *data, size_t begin, size_t end, int32_t slot)
 {
     (void)slot;
     const sweep *w = data;
-    const ascc_smoothing *s = w->of;
-    s->state->tools.kernels->roughness(&s->pairs, begin, end, w->velocity, w->rough);
-    for (size_t i = begin; !s->sum->uniform && i < end; i++)
-        for (size_t c = 0; c < 3; c++)
-            w->rough[i * 4 + c] *= (float)(w->heaviest / s->sum->mass[i]);
+    differ(w, begin, end, w->velocity, w->rough);
 }
 
 /* One factor a row, so that no sweep adds energy. */
@@ -131,24 +145,33 @@ static void fade_rows(void *data, size_t begin, size_t end, int32_t slot)
     }
 }
 
+static void smooth_rows(void *data, size_t begin, size_t end, int32_t slot)
+{
+    (void)slot;
+    const sweep *w = data;
+    for (size_t k = begin * 4; k < end * 4; k++)
+        w->sum[k] += w->share * w->rough[k];
+    if (w->last)
+        return;
+    differ(w, begin, end, w->rough, w->taken);
+    for (size_t i = begin; i < end; i++)
+        for (size_t c = 0; c < 3; c++)
+            w->velocity[i * 4 + c] -= w->share * w->taken[i * 4 + c];
+}
+
 /* Pairs with rows before i that have no turn of their own: of other processes; those that sleep have no coefficient. */
 static bool add_idle_pairs(const sweep *w, ascc_pair_sum *sum, size_t i)
 {
-    const ascc_smoothing *s = w->of;
-    const ascc_hierarchy *h = &s->state->hierarchy;
-    const float *here = w->rough + i * 4;
+    const ascc_hierarchy *h = &w->of->state->hierarchy;
+    const float *here = w->sum + i * 4;
     bool good = true;
-    for (size_t k = s->pairs.start[i]; h->idle && k < s->pairs.end[i]; k++) {
-        const size_t j = s->pairs.neighbor[k];
+    for (size_t k = w->pairs.start[i]; h->idle && k < w->pairs.end[i]; k++) {
+        const size_t j = w->pairs.neighbor[k];
         if (j >= i || !ascc_hierarchy_is_idle(h, j))
             continue;
-        const float *there = w->rough + j * 4;
-        float square = 0.0f;
-        for (size_t c = 0; c < 3; c++)
-            square = fmaf(s->pairs.g[c][k], s->pairs.g[c][k], square);
-        const float weight = square * (here[3] < there[3] ? here[3] : there[3]);
+        const float *there = w->sum + j * 4;
         for (size_t c = 0; c < 3; c++) {
-            const double impulse = (double)(weight * (here[c] - there[c])) * -w->factor;
+            const double impulse = (double)(w->pairs.weight[k] * (here[c] - there[c])) * -w->factor;
             int64_t quanta = 0;
             good &= ascc_round_quanta(&impulse, 1, &quanta);
             sum->sum[i * sum->stride + c] += quanta;
@@ -161,7 +184,7 @@ static bool evaluate(ascc_pair_sum *sum, size_t i)
 {
     const sweep *w = sum->data;
     const ascc_smoothing *s = w->of;
-    if (!s->state->tools.kernels->rough_impulses(&s->pairs, w->rough, w->factor, i,
+    if (!s->state->tools.kernels->rough_impulses(&w->pairs, w->sum, w->factor, i,
                                                  ASCC_IMPULSE_LIMIT, sum->sum) ||
         !add_idle_pairs(w, sum, i))
         ascc_pair_sum_note_bad(sum, i);
@@ -177,34 +200,46 @@ static void trace_sweep(const sweep *w, int32_t k)
     memcpy(t->rough + (size_t)k * numbers, w->rough, numbers * sizeof *w->rough);
 }
 
+/* Ghosts' rows, as their owners have them. */
+static ascc_status refresh(const sweep *w, float *of)
+{
+    const ascc_halo_rows rows = {of, 4 * sizeof *of};
+    return ascc_hierarchy_refresh(&w->of->state->hierarchy, ASCC_SET_FLUID, &rows, 1);
+}
+
 static ascc_status smooth(sweep *w, int32_t k)
 {
     const ascc_smoothing *s = w->of;
-    ascc_step_state *state = s->state;
-    ascc_workers *workers = state->tools.workers;
-    const ascc_impulses to = {s->given, NULL};
-    const ascc_halo_rows velocity = {w->velocity, 4 * sizeof *w->velocity};
-    const ascc_halo_rows rough = {w->rough, 4 * sizeof *w->rough};
-    uint64_t pairs;
-    w->factor = ascc_smoothing_share(state, state->relaxation->viscosity.omega[k]) *
-                ascc_relaxation_quanta(state) * w->heaviest;
-    ascc_workers_run(workers, s->count, 4 * ROWS, velocity_rows, w);
-    ascc_status status = ascc_hierarchy_refresh(&state->hierarchy, ASCC_SET_FLUID, &velocity, 1);
-    if (status != ASCC_OK)
-        return status;
+    ascc_workers *workers = s->state->tools.workers;
+    const ascc_sweeps *sweeps = &s->state->relaxation->viscosity;
+    w->share = (float)ascc_smoothing_share(s->state, sweeps->omega[k]);
+    w->last = k + 1 == sweeps->count;
     ascc_workers_run(workers, s->count, ROWS, rough_rows, w);
+    w->pairs.weight = s->weight;
+    w->weigh = NULL;
     if (s->trace)
         trace_sweep(w, k);
     ascc_workers_run(workers, s->count, 4 * ROWS, fade_rows, w);
-    status = ascc_hierarchy_refresh(&state->hierarchy, ASCC_SET_FLUID, &rough, 1);
+    const ascc_status status = refresh(w, w->rough);
     if (status != ASCC_OK)
         return status;
+    ascc_workers_run(workers, s->count, ROWS, smooth_rows, w);
+    return w->last ? ASCC_OK : refresh(w, w->velocity);
+}
+
+/* Momenta become what all sweeps make of them. */
+static ascc_status give(sweep *w)
+{
+    const ascc_smoothing *s = w->of;
+    const ascc_impulses to = {s->given, NULL};
+    uint64_t pairs;
+    w->factor = ascc_relaxation_quanta(s->state) * w->heaviest;
     memset(s->sum->sum, 0, s->count * s->sum->stride * sizeof *s->sum->sum);
     s->sum->data = w;
     s->sum->whole = evaluate;
     ascc_pair_sum_run(s->sum, s->rows, NULL);
-    status = ascc_pair_sum_give(s->sum, w->rough, 4, &to, &pairs);
-    return status == ASCC_OK ? ascc_relaxation_add(state, s->given) : status;
+    const ascc_status status = ascc_pair_sum_give(s->sum, w->sum, 4, &to, &pairs);
+    return status == ASCC_OK ? ascc_relaxation_add(s->state, s->given) : status;
 }
 
 static bool keep_sweeps(const ascc_smoothing *s, int32_t sweeps)
@@ -214,6 +249,7 @@ static bool keep_sweeps(const ascc_smoothing *s, int32_t sweeps)
     if (!t)
         return true;
     t->coefficient = s->coefficient;
+    t->weight = s->weight;
     t->smoothed = ascc_arena_take(s->state->tools.arena, rows, 4 * sizeof *t->smoothed);
     t->rough = ascc_arena_take(s->state->tools.arena, rows, 4 * sizeof *t->rough);
     return t->smoothed && t->rough;
@@ -223,14 +259,20 @@ ascc_status ascc_smooth_velocities(const ascc_smoothing *s)
 {
     ascc_arena *arena = s->state->tools.arena;
     const int32_t sweeps = ascc_smoothing_sweeps(s->state);
-    sweep w = {.of = s,
-               .bound = ascc_smoothing_bound(s->state),
-               .velocity = ascc_arena_lend(arena, s->count, 4 * sizeof *w.velocity),
-               .rough = ascc_arena_lend(arena, s->count, 4 * sizeof *w.rough)};
-    if (!w.velocity || !w.rough || !keep_sweeps(s, sweeps))
+    sweep w = {
+        .of = s, .pairs = s->pairs, .weigh = s->weight, .bound = ascc_smoothing_bound(s->state)};
+    float **const rows[] = {&w.velocity, &w.rough, &w.sum, &w.taken};
+    bool room = keep_sweeps(s, sweeps);
+    for (size_t i = 0; i < sizeof rows / sizeof *rows; i++)
+        room &= (*rows[i] = ascc_arena_lend(arena, s->count, 4 * sizeof(float))) != NULL;
+    if (!room)
         return ascc_fail(s->state->tools.message, ASCC_ERROR_MEMORY, "no memory for a viscosity");
     ascc_status status = find_heaviest(s, &w.heaviest);
+    if (status != ASCC_OK || sweeps == 0)
+        return status;
+    ascc_workers_run(s->state->tools.workers, s->count, 4 * ROWS, velocity_rows, &w);
+    status = refresh(&w, w.velocity);
     for (int32_t k = 0; k < sweeps && status == ASCC_OK; k++)
         status = smooth(&w, k);
-    return status;
+    return status == ASCC_OK ? give(&w) : status;
 }

@@ -13,6 +13,7 @@ typedef struct ascc_smoothing {
     const ascc_rows *rows;    /* what the pairs are among */
     ascc_pair_sum *sum;       /* open, 4 wide */
     const float *coefficient; /* [count] of a row's pairs; of a pair it is the smaller one */
+    float *weight;            /* room for those of pairs; it may be that of the pairs' g[0] */
     size_t count;
     ascc_relaxation_trace *trace; /* where sweeps are kept for a way back, or NULL */
     int64_t *given;               /* room for impulses, [host's rows][dimension] */

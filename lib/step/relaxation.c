@@ -970,11 +970,17 @@ static ascc_status slow_down(ascc_step_state *state, relaxation *r, int64_t *giv
     }
     if (status != ASCC_OK || !r->smoothing)
         return status;
+    float *weight = r->g[0]; /* which nothing reads any more but a way back */
+    if (r->trace)
+        weight = room_for(r, r->capacity, sizeof *weight);
+    if (!weight)
+        return no_memory(state);
     const ascc_smoothing smoothing = {.state = state,
                                       .pairs = gradients(r),
                                       .rows = r->rows,
                                       .sum = &r->sum,
                                       .coefficient = r->smoothing,
+                                      .weight = weight,
                                       .count = r->count,
                                       .trace = r->trace,
                                       .given = given};

@@ -72,6 +72,7 @@ typedef struct ascc_relaxation_trace {
     bool guessed;        /* else the first sweep begins with 0 and changes nothing */
     /* Of a hyperviscosity: */
     const float *coefficient; /* [row] NULL = there is none */
+    const float *weight;      /* of pairs */
     float *smoothed,
         *rough; /* [sweep][row][4] velocities that it began with; how rough they were */
 } ascc_relaxation_trace;

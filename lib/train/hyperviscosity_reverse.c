@@ -17,7 +17,7 @@ typedef struct reverse {
     const ascc_relaxation_trace *trace;
     size_t count;
     float bound;
-    /* Rows of 4, the last a coefficient: z, A z and then w, A w, F(A v). */
+    /* Rows of 4, the last 0: z, A z and then w, A w, F(A v). */
     float *z, *w, *back, *faded;
     float *by_square; /* [pair] so far without the coefficient */
 } reverse;
@@ -71,18 +71,19 @@ static void add_pairs(const reverse *r, const float *velocity)
 static void sweep_back(const reverse *r, int32_t k, float *by)
 {
     const ascc_kernels *kernels = r->state->tools.kernels;
-    const ascc_gradients *pairs = &r->trace->pairs;
+    ascc_gradients pairs = r->trace->pairs;
     const float *velocity = r->trace->smoothed + (size_t)k * r->count * 4;
     const float *rough = r->trace->rough + (size_t)k * r->count * 4;
     const double share = r->state->network->plan->relaxation.viscosity.omega[k];
     const float factor = -(float)ascc_smoothing_share(r->state, share);
     for (size_t i = 0; i < r->count; i++)
         for (size_t c = 0; c < 4; c++)
-            r->z[i * 4 + c] = c < 3 ? factor * by[i * 4 + c] : r->trace->coefficient[i];
-    kernels->roughness(pairs, 0, r->count, r->z, r->w);
+            r->z[i * 4 + c] = c < 3 ? factor * by[i * 4 + c] : 0.0f;
+    pairs.weight = r->trace->weight;
+    kernels->roughness(&pairs, 0, r->count, r->z, NULL, r->w);
     for (size_t i = 0; i < r->count; i++)
         fade(rough + i * 4, r->bound, r->faded + i * 4, r->w + i * 4);
-    kernels->roughness(pairs, 0, r->count, r->w, r->back);
+    kernels->roughness(&pairs, 0, r->count, r->w, NULL, r->back);
     add_pairs(r, velocity);
     for (size_t i = 0; i < r->count; i++)
         for (size_t c = 0; c < 3; c++)
