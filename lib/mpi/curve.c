@@ -45,23 +45,9 @@ uint64_t ascc_curve_key(const ascc_curve *curve, const int64_t block[3])
     return key;
 }
 
-/* The key that decides who owns a block. */
-static uint64_t owning_key(const ascc_curve *curve, const int64_t block[3])
+/* Who has the place of a key on the curve. */
+static int owner_of_key(const ascc_curve *curve, uint64_t key)
 {
-    int64_t at[3];
-    if (curve->blocks.count == 0)
-        return ascc_curve_key(curve, block);
-    for (int c = 0; c < 3; c++)
-        at[c] = block[c] < curve->low[c]    ? curve->low[c]
-                : block[c] > curve->high[c] ? curve->high[c]
-                                            : block[c];
-    const uint32_t known = ascc_blocks_find(&curve->blocks, at);
-    return known != ASCC_NO_BLOCK ? curve->key[known] : ascc_curve_key(curve, at);
-}
-
-int ascc_curve_owner(const ascc_curve *curve, const int64_t block[3])
-{
-    const uint64_t key = owning_key(curve, block);
     int low = 0, high = curve->size; /* the owner is in [low, high) */
     while (high - low > 1) {
         const int middle = low + (high - low) / 2;
@@ -71,6 +57,27 @@ int ascc_curve_owner(const ascc_curve *curve, const int64_t block[3])
             high = middle;
     }
     return low;
+}
+
+/* What is known of a block; NULL if nothing is. at: the nearest block in the box of those with fluid. */
+static ascc_holding *find_holding(const ascc_curve *curve, const int64_t block[3], int64_t at[3])
+{
+    memcpy(at, block, 3 * sizeof *at);
+    if (curve->blocks.count == 0)
+        return NULL;
+    for (int c = 0; c < 3; c++)
+        at[c] = at[c] < curve->low[c]    ? curve->low[c]
+                : at[c] > curve->high[c] ? curve->high[c]
+                                         : at[c];
+    const uint32_t known = ascc_blocks_find(&curve->blocks, at);
+    return known != ASCC_NO_BLOCK ? &curve->holding[known] : NULL;
+}
+
+int ascc_curve_owner(const ascc_curve *curve, const int64_t block[3])
+{
+    int64_t at[3];
+    const ascc_holding *holding = find_holding(curve, block, at);
+    return holding ? holding->owner : owner_of_key(curve, ascc_curve_key(curve, at));
 }
 
 int ascc_curve_owner_of(const ascc_curve *curve, const double *place)
@@ -108,34 +115,43 @@ static void find_in_box(ascc_owners *owners, const ascc_curve *curve, const doub
                 add_owner(owners, ascc_curve_owner(curve, at));
 }
 
-/* Whether one process owns all within reach of a block, as of most of them. */
+/* Whether one process owns all within reach of a block that is known, as of most of them. */
 static bool is_inner(ascc_owners *owners, const ascc_curve *curve, const double *place,
                      double reach)
 {
     double from[3] = {0.0, 0.0, 0.0}, to[3] = {0.0, 0.0, 0.0};
-    int64_t block[3];
+    int64_t block[3], at[3];
     ascc_curve_block(curve, place, block);
-    if (!owners->known || owners->reach != reach ||
-        memcmp(block, owners->block, sizeof block) != 0) {
+    ascc_holding *holding = find_holding(curve, block, at);
+    if (!holding || memcmp(at, block, sizeof at) != 0 || reach >= holding->outer)
+        return false;
+    if (reach > holding->inner) {
         for (int32_t c = 0; c < curve->dimension; c++) {
             from[c] = (double)block[c] * curve->edge - reach;
             to[c] = (double)(block[c] + 1) * curve->edge + reach;
         }
-        owners->known = false;
         find_in_box(owners, curve, from, to);
-        memcpy(owners->block, block, sizeof block);
-        owners->reach = reach;
-        owners->inner = owners->count == 1;
+        *(owners->count == 1 ? &holding->inner : &holding->outer) = reach;
     }
-    return owners->inner;
+    return reach <= holding->inner;
+}
+
+/* One process alone. */
+static void set_owner(ascc_owners *owners, int rank)
+{
+    owners->known = false;
+    owners->count = 1;
+    owners->rank[0] = rank;
 }
 
 void ascc_owners_find(ascc_owners *owners, const ascc_curve *curve, const double *place,
                       double reach)
 {
     double from[3] = {0.0, 0.0, 0.0}, to[3] = {0.0, 0.0, 0.0};
-    if (is_inner(owners, curve, place, reach))
+    if (is_inner(owners, curve, place, reach)) {
+        set_owner(owners, ascc_curve_owner_of(curve, place));
         return;
+    }
     for (int32_t c = 0; c < curve->dimension; c++) {
         from[c] = place[c] - reach;
         to[c] = place[c] + reach;
@@ -167,16 +183,23 @@ static bool reserve(ascc_curve *curve, const ascc_allocator *allocator, size_t c
 {
     ascc_blocks *b = &curve->blocks;
     const size_t slots = ascc_blocks_slots(count);
-    void *at = b->at, *slot = b->slot, *key = curve->key;
-    const bool room = ascc_grow(allocator, &at, &curve->block_capacity, count, sizeof *b->at) &
-                      ascc_grow(allocator, &slot, &curve->slot_capacity, slots, sizeof *b->slot) &
-                      ascc_grow(allocator, &key, &curve->key_capacity, count, sizeof *curve->key);
+    void *at = b->at, *slot = b->slot, *holding = curve->holding;
+    const bool room =
+        ascc_grow(allocator, &at, &curve->block_capacity, count, sizeof *b->at) &
+        ascc_grow(allocator, &slot, &curve->slot_capacity, slots, sizeof *b->slot) &
+        ascc_grow(allocator, &holding, &curve->holding_capacity, count, sizeof *curve->holding);
     b->at = at;
     b->slot = slot;
-    curve->key = key;
+    curve->holding = holding;
     if (room)
         ascc_blocks_open(b, at, slot, slots);
     return room;
+}
+
+static void add_block(ascc_curve *curve, const int64_t block[3], int owner)
+{
+    const ascc_holding holding = {.owner = owner, .inner = -1.0, .outer = HUGE_VAL};
+    curve->holding[ascc_blocks_add(&curve->blocks, block)] = holding;
 }
 
 static void add_full(ascc_curve *curve, const ascc_load *load, size_t count)
@@ -188,7 +211,7 @@ static void add_full(ascc_curve *curve, const ascc_load *load, size_t count)
             curve->low[c] = i && curve->low[c] < at[c] ? curve->low[c] : at[c];
             curve->high[c] = i && curve->high[c] > at[c] ? curve->high[c] : at[c];
         }
-        curve->key[ascc_blocks_add(&curve->blocks, at)] = load[i].key;
+        add_block(curve, at, owner_of_key(curve, load[i].key));
     }
 }
 
@@ -200,7 +223,7 @@ static void add_empty(ascc_curve *curve, const int64_t block[3], size_t full)
     for (int k = 0; k < count; k++) {
         const uint32_t found = ascc_blocks_find(&curve->blocks, beside[k]);
         if (found < full) {
-            curve->key[ascc_blocks_add(&curve->blocks, block)] = curve->key[found];
+            add_block(curve, block, curve->holding[found].owner);
             return;
         }
     }
@@ -242,8 +265,8 @@ void ascc_curve_release(ascc_curve *curve, const ascc_allocator *allocator)
     if (curve->blocks.slot)
         ascc_release(allocator, curve->blocks.slot, curve->slot_capacity,
                      sizeof *curve->blocks.slot);
-    if (curve->key)
-        ascc_release(allocator, curve->key, curve->key_capacity, sizeof *curve->key);
+    if (curve->holding)
+        ascc_release(allocator, curve->holding, curve->holding_capacity, sizeof *curve->holding);
 }
 
 /* ---- Balance ---- */

@@ -13,6 +13,12 @@
 #include "base/memory.h"
 #include "points/blocks.h"
 
+/* Whose a block is; and how far, as far as was asked, all around it is the same one's: to `inner`, not to `outer`. */
+typedef struct ascc_holding {
+    int owner;
+    double inner, outer;
+} ascc_holding;
+
 typedef struct ascc_curve {
     int32_t dimension;
     int size;        /* processes */
@@ -21,8 +27,8 @@ typedef struct ascc_curve {
     double *cut;     /* [size] scratch */
     /* Blocks that had fluid when ascc_curve_know was told, and those beside them: */
     ascc_blocks blocks;
-    uint64_t *key; /* [blocks] by which each has its owner */
-    size_t block_capacity, slot_capacity, key_capacity;
+    ascc_holding *holding; /* [blocks] */
+    size_t block_capacity, slot_capacity, holding_capacity;
     int64_t low[3], high[3]; /* of those with fluid */
 } ascc_curve;
 
@@ -35,9 +41,6 @@ int ascc_curve_owner_of(const ascc_curve *curve, const double *place);
 /* The processes that own a block within `reach` of a place on every axis, each once, ascending in order of finding. */
 typedef struct ascc_owners {
     int64_t low[3], high[3]; /* blocks; those of the last place */
-    int64_t block[3];        /* that it was in */
-    double reach;            /* that was asked for */
-    bool inner;              /* one process owns all within reach of that block */
     bool known;
     int count, *rank; /* [size] */
     uint8_t *is;      /* [size] */

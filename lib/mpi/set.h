@@ -42,11 +42,13 @@ struct ascc_mpi_particles {
         *local; /* walls and bodies of all, fluid of this process; ghosts while a step lasts */
     ascc_curve curve;
     ascc_owners owners;
-    bool cut;                                /* the curve is cut by what fluid there is */
-    double farthest;                         /* that fluid has gone since then, host's unit */
-    size_t total;                            /* fluid of all then */
-    uint64_t neighbors;                      /* of fluid of this process in the last step */
-    uint64_t age;                            /* steps since the last look at the balance */
+    bool cut;           /* the curve is cut by what fluid there is */
+    double farthest;    /* that fluid has gone since then, host's unit */
+    double went[2];     /* the same of the last step and of this one */
+    bool again;         /* a step begins once more, with ghosts from farther away */
+    size_t total;       /* fluid of all then */
+    uint64_t neighbors; /* of fluid of this process in the last step */
+    uint64_t age;       /* steps since the last look at the balance */
     ascc_mpi_ghosts ghosts[ASCC_MAX_LEVELS]; /* fluid, then levels by number */
     double reach[ASCC_MAX_LEVELS];           /* host's unit: how far a row of the set is read */
     ascc_mpi_array flags;                    /* uint8_t: ghosts among fluid rows */
@@ -70,6 +72,7 @@ struct ascc_mpi_particles {
 /* Ghosts serve so far, spacings, and by this factor farther than fluid has gone. */
 #define ASCC_MPI_NEAR 0.5
 #define ASCC_MPI_SPARE 1.25
+#define ASCC_MPI_SURE 1.1          /* than they are expected to go: less is not enough */
 #define ASCC_MPI_MAGIC 0x49435341u /* "ASCI" */
 
 bool ascc_mpi_room(ascc_mpi_particles *set, ascc_mpi_array *array, size_t count, size_t element);
