@@ -1,12 +1,13 @@
 /* A pool that rests, takes a block of water, loses it again and takes another: what each frame costs, on which rung it
  * ran, and how far it is from another run. SPDX-License-Identifier: MIT
  *
- *   budget MODEL[,MODEL...] [--budget MS] [--sleep V] [--size N] [--frames N] [--keep FILE] [--like FILE]
+ *   budget MODEL[,MODEL...] [--budget MS] [--sleep V] [--detail X] [--size N] [--frames N] [--keep FILE] [--like FILE]
  *
  * The pool has N x N / 2 x N particles, a block an eighth of N^3, which falls after a sixth of the frames, is taken
  * out after a half and let in again after two thirds. A line of CSV for each frame; time is CPU time of the one
  * thread, so that other programs on the machine count little. --keep writes the places of every tenth frame, --like
- * reads those of another run: the Chamfer distance to it, both ways in the mean.
+ * reads those of another run: the Chamfer distance to it, both ways in the mean. --detail: the first model runs, the last
+ * one the share X of the pool's length, and a ramp of four spacings between them.
  */
 #include <math.h>
 #include <stdbool.h>
@@ -21,11 +22,12 @@
 #include "measures.h"
 
 #define WALL_SPACING 0.64 /* in particle spacings */
+#define RAMP 4.0          /* spacings */
 enum { EVERY = 10 };      /* frames from one that is kept to the next */
 
 typedef struct options {
     const char *models, *keep, *like;
-    double budget, sleep;
+    double budget, sleep, detail;
     int size, frames;
 } options;
 
@@ -201,14 +203,33 @@ static double compare(run *r, size_t count)
     return 0.5 * (there + back);
 }
 
+/* A step on the first rung, with the last one's share by place. */
+static ascc_status run_detailed(run *r)
+{
+    const size_t count = ascc_particles_count(r->particles, ASCC_FLUID);
+    const double end = r->o->detail * (r->o->size + 1);
+    const int32_t first = 0;
+    const ascc_array x = {.data = r->places, .scalar = ASCC_DOUBLE};
+    if (ascc_particles_get(r->particles, ASCC_FLUID, ASCC_POSITION, 0, count, &x) != ASCC_OK)
+        fail(r, "places");
+    for (size_t i = 0; i < count; i++)
+        r->places[i] = fmin(1.0, fmax(0.0, 0.5 + (end - r->places[3 * i] / r->spacing) / RAMP));
+    const ascc_const_array weight = {.data = r->places, .scalar = ASCC_DOUBLE};
+    if (ascc_particles_set(r->particles, ASCC_FLUID, ASCC_DETAIL, 0, count, &weight) != ASCC_OK)
+        fail(r, "weights");
+    return ascc_ladder_replay(r->ladder, r->particles, NULL, &first, 1);
+}
+
 static void run_frame(run *r, int frame)
 {
     ascc_ladder_statistics told = {.size = sizeof told};
     ascc_step_statistics step = {.size = sizeof step};
     ascc_measures motion = {.size = sizeof motion};
     change_scene(r, frame);
-    if (ascc_ladder_run(r->ladder, r->particles, NULL, 1) != ASCC_OK)
-        fail(r, "step");
+    const ascc_status status =
+        r->o->detail > 0.0 ? run_detailed(r) : ascc_ladder_run(r->ladder, r->particles, NULL, 1);
+    if (status != ASCC_OK)
+        fail(r, ascc_ladder_message(r->ladder));
     (void)ascc_ladder_get_statistics(r->ladder, &told);
     (void)ascc_step_get_statistics(ascc_ladder_step(r->ladder, told.rung), &step);
     (void)ascc_particles_measure(r->particles, &motion);
@@ -245,6 +266,8 @@ int main(int argc, char **argv)
             o.budget = atof(value);
         else if (strcmp(name, "--sleep") == 0)
             o.sleep = atof(value);
+        else if (strcmp(name, "--detail") == 0)
+            o.detail = atof(value);
         else if (strcmp(name, "--size") == 0)
             o.size = atoi(value);
         else if (strcmp(name, "--frames") == 0)
@@ -257,8 +280,9 @@ int main(int argc, char **argv)
             good = false;
     }
     if (!good || o.size < 4 || o.frames < 6) {
-        fprintf(stderr, "usage: budget MODEL[,MODEL...] [--budget MS] [--sleep V] [--size N] "
-                        "[--frames N] [--keep FILE] [--like FILE]\n");
+        fprintf(stderr,
+                "usage: budget MODEL[,MODEL...] [--budget MS] [--sleep V] [--detail X] [--size N] "
+                "[--frames N] [--keep FILE] [--like FILE]\n");
         return 2;
     }
     run r = {.o = &o};

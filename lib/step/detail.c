@@ -66,67 +66,99 @@ static ascc_status no_memory(const ascc_step_state *state)
 
 /* ---- Which rows ---- */
 
-static void note(void *data, uint32_t block)
+/* Blocks of space with fluid, and which of them hold some with a weight. */
+typedef struct sight {
+    ascc_blocks blocks;
+    uint8_t *weighted; /* [block] */
+    double edge;
+    int32_t dimension;
+    int64_t last[3]; /* the block looked at, and whether it is near one with a weight */
+    uint32_t number;
+    bool is_near;
+} sight;
+
+static bool lend_sight(sight *s, ascc_arena *arena, const ascc_particles *p)
 {
-    (void)block;
-    *(bool *)data = true;
+    const size_t n = p->fluid_count, slots = ascc_blocks_slots(n);
+    int64_t(*at)[3] = ascc_arena_lend(arena, n, sizeof *at);
+    uint32_t *slot = ascc_arena_lend(arena, slots, sizeof *slot);
+    *s = (sight){.weighted = ascc_arena_lend(arena, n, 1),
+                 .edge = SIGHT / REACH * p->spacing,
+                 .dimension = p->dimension,
+                 .last = {INT64_MAX, 0, 0}};
+    if (at && slot)
+        ascc_blocks_open(&s->blocks, at, slot, slots);
+    return at && slot && s->weighted;
 }
 
-static bool lend_blocks(ascc_blocks *blocks, ascc_arena *arena, size_t most)
+/* Rows that follow one another lie mostly in one block. */
+static bool is_last(sight *s, const double *place)
 {
-    const size_t slots = ascc_blocks_slots(most);
-    int64_t(*at)[3] = ascc_arena_lend(arena, most, sizeof *at);
-    uint32_t *slot = ascc_arena_lend(arena, slots, sizeof *slot);
-    if (at && slot)
-        ascc_blocks_open(blocks, at, slot, slots);
-    return at && slot;
+    int64_t at[3];
+    ascc_block_of(place, s->dimension, s->edge, at);
+    const bool same = memcmp(at, s->last, sizeof at) == 0;
+    memcpy(s->last, at, sizeof at);
+    return same;
+}
+
+static uint32_t add_place(sight *s, const double *place)
+{
+    const size_t before = s->blocks.count;
+    if (!is_last(s, place))
+        s->number = ascc_blocks_add(&s->blocks, s->last);
+    if (s->blocks.count > before)
+        s->weighted[s->number] = 0;
+    return s->number;
+}
+
+static void note(void *data, uint32_t block)
+{
+    sight *s = data;
+    s->is_near |= s->weighted[block] != 0;
+}
+
+static bool is_near(sight *s, const int64_t at[3])
+{
+    s->is_near = false;
+    ascc_blocks_around(&s->blocks, at, s->dimension, REACH, note, s);
+    return s->is_near;
+}
+
+static void choose_walls(sight *s, const ascc_particles *p, uint8_t *walls)
+{
+    s->last[0] = INT64_MAX;
+    for (size_t i = 0; i < p->boundary_count; i++)
+        walls[i] = is_last(s, p->wall_position + i * (size_t)p->dimension) ? s->is_near
+                                                                           : is_near(s, s->last);
 }
 
 /* The rows with a weight, and those in blocks near theirs; false without memory. */
 static bool choose_rows(const ascc_step_state *state, ascc_arena *arena, near_set *near)
 {
     const ascc_particles *p = state->particles;
-    const size_t n = p->fluid_count, d = (size_t)p->dimension;
-    const double edge = SIGHT / REACH * p->spacing;
-    ascc_blocks all, weighted;
+    const size_t n = p->fluid_count;
     size_t count = 0;
+    sight s;
     near->row = ascc_arena_take(arena, n, sizeof *near->row);
     near->walls = ascc_arena_take(arena, p->boundary_count, 1);
     const ascc_arena_mark mark = ascc_arena_mark_of(arena);
     uint32_t *of = ascc_arena_lend(arena, n, sizeof *of);
     uint8_t *seen = ascc_arena_lend(arena, n, 1);
-    bool room = near->row && near->walls && of && seen && lend_blocks(&all, arena, n) &&
-                lend_blocks(&weighted, arena, n);
-    for (size_t i = 0; room && i < n; i++) {
-        int64_t at[3];
-        ascc_block_of(p->position + i * d, p->dimension, edge, at);
-        of[i] = ascc_blocks_add(&all, at);
-        if (p->detail[i] > 0.0)
-            (void)ascc_blocks_add(&weighted, at);
+    if (!near->row || !near->walls || !of || !seen || !lend_sight(&s, arena, p))
+        return false;
+    for (size_t i = 0; i < n; i++) {
+        of[i] = add_place(&s, p->position + i * (size_t)p->dimension);
+        s.weighted[of[i]] |= p->detail[i] > 0.0;
     }
-    for (size_t b = 0; room && b < all.count; b++) {
-        bool is_near = false;
-        ascc_blocks_around(&weighted, all.at[b], p->dimension, REACH, note, &is_near);
-        seen[b] = is_near;
-    }
-    for (size_t i = 0; room && i < n; i++)
+    for (size_t b = 0; b < s.blocks.count; b++)
+        seen[b] = s.weighted[b] || is_near(&s, s.blocks.at[b]);
+    for (size_t i = 0; i < n; i++)
         if (seen[of[i]])
             near->row[count++] = i;
+    choose_walls(&s, p, near->walls);
     near->particles.fluid_count = count;
-    int64_t last[3] = {INT64_MAX, 0, 0};
-    bool is_near = false;
-    for (size_t i = 0; room && i < p->boundary_count; i++) {
-        int64_t at[3];
-        ascc_block_of(p->wall_position + i * d, p->dimension, edge, at);
-        if (memcmp(at, last, sizeof at) != 0) {
-            is_near = false;
-            ascc_blocks_around(&weighted, at, p->dimension, REACH, note, &is_near);
-        }
-        memcpy(last, at, sizeof last);
-        near->walls[i] = is_near;
-    }
     ascc_arena_return(arena, mark);
-    return room;
+    return true;
 }
 
 /* ---- The set ---- */

@@ -815,8 +815,8 @@ static bool goes_on(const relaxation *r, size_t i)
 {
     const ascc_relaxation *const *part = r->state->part;
     const int32_t most = r->constants->rounds;
-    return !r->share || (r->share[i] > 0.0f && part[0]->rounds == most) ||
-           (r->share[i] < 1.0f && part[1]->rounds == most);
+    return !r->share || (r->share[i] >= 0.5f && part[0]->rounds == most) ||
+           (r->share[i] <= 0.5f && part[1]->rounds == most);
 }
 
 /* Mean of what is left of the excess as the last sweep began, and the largest of rows that go on. */
