@@ -7,6 +7,7 @@
 
 #include "model/model.h"
 #include "points/particles.h"
+#include "step/active_rows.h"
 #include "support/counting.h"
 #include "support/model_builder.h"
 #include "support/tools.h"
@@ -420,6 +421,62 @@ static void unequal_masses_move_as_the_oracle_says(void **state)
     for (uint64_t seed = 11; seed <= 14; seed++)
         for (int d = 2; d <= 3; d++)
             compare_with_oracle(seed, d, 1.4, true);
+}
+
+/* Few particles have a pressure: sweeps leave out rows. */
+static void loose_fluid_moves_as_the_oracle_says(void **state)
+{
+    (void)state;
+    for (uint64_t seed = 21; seed <= 26; seed++)
+        for (int d = 2; d <= 3; d++)
+            compare_with_oracle(seed, d, 0.3 + 0.1 * (double)(seed - 20), seed % 2);
+}
+
+/* A chain in which each row has pairs with the two rows on either side. */
+static void rows_are_active_around_those_with_a_pressure(void **state)
+{
+    (void)state;
+    enum { COUNT = 60, PAIRS = 8 };
+    static size_t start[COUNT], end[COUNT];
+    static uint32_t neighbor[COUNT * PAIRS];
+    float pressure[COUNT] = {0};
+    for (size_t i = 0; i < COUNT; i++) {
+        size_t n = i * PAIRS;
+        start[i] = n;
+        for (size_t j = i < 2 ? 0 : i - 2; j < COUNT && j <= i + 2; j++)
+            if (j != i)
+                neighbor[n++] = (uint32_t)j;
+        for (end[i] = (i + 1) * PAIRS; n < end[i]; n++)
+            neighbor[n] = (uint32_t)i;
+    }
+    const ascc_gradients pairs = {.start = start, .end = end, .neighbor = neighbor};
+    world w;
+    ascc_arena arena;
+    ascc_active_rows rows;
+    open_context(&w, NULL);
+    ascc_arena_open(&arena, &w.context->allocator);
+    assert_true(ascc_active_rows_open(&rows, &arena, COUNT));
+    ascc_active_rows_clear(&rows);
+    const size_t at[] = {30, 0};
+    for (size_t k = 0; k < 2; k++) { /* the second is added to the first */
+        pressure[at[k]] = 1.0f;
+        ascc_active_rows_press(&rows, w.context->workers, &pairs, pressure);
+        pressure[at[k]] = 0.0f;
+        ascc_active_rows_move(&rows, w.context->workers, &pairs);
+        for (size_t i = 0; i < COUNT; i++) {
+            const bool first = k == 1 && i <= 2, second = k == 1 && i <= 4;
+            assert_int_equal(rows.pushed[i], first || (i >= 28 && i <= 32));
+            assert_int_equal(rows.moved[i], second || (i >= 26 && i <= 34));
+        }
+    }
+    assert_int_equal(ascc_active_run(rows.pushed, 5, COUNT), 28);
+    assert_int_equal(ascc_active_run(rows.pushed, 28, 31), 31);
+    ascc_active_rows_clear(&rows);
+    ascc_active_rows_press(&rows, w.context->workers, &pairs, pressure);
+    assert_int_equal(ascc_active_run(rows.pushed, 0, COUNT), COUNT);
+    assert_int_equal(rows.pushed[0], 0);
+    ascc_arena_close(&arena);
+    ascc_context_destroy(&w.context);
 }
 
 /* ---- The laws of a step ---- */
@@ -1221,6 +1278,8 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_step_is_what_the_oracle_computes_in_doubles),
         cmocka_unit_test(unequal_masses_move_as_the_oracle_says),
+        cmocka_unit_test(loose_fluid_moves_as_the_oracle_says),
+        cmocka_unit_test(rows_are_active_around_those_with_a_pressure),
         cmocka_unit_test(the_same_bits_on_every_cpu_for_any_threads_and_order),
         cmocka_unit_test(momentum_is_conserved_to_the_bit_with_walls_and_unequal_masses),
         cmocka_unit_test(along_the_lines_before_a_step_angular_momentum_is_conserved),

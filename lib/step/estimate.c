@@ -226,7 +226,7 @@ static double relaxation_bytes(const ascc_network *network, double fluid, double
     }
     const double smoothing = plan->relaxation.viscosity.count ? 68.0 : 0.0;
     const double walls = 2.0 * POINT_BYTES + 4.0 + SORT_BYTES + 4.0 * 1.125 * WALL_NEIGHBORS;
-    return fluid * (141.0 + smoothing + 21.0 * (row_length(plan, &key) + 4.0)) +
+    return fluid * (144.0 + smoothing + 21.0 * (row_length(plan, &key) + 4.0)) +
            boundary * (4.0 + walls) + anew;
 }
 

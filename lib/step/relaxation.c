@@ -14,6 +14,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "active_rows.h"
 #include "hyperviscosity.h"
 #include "relaxation_pairs.h"
 
@@ -21,6 +22,11 @@
 #define SET_ASIDE 4096 /* pairs, so that workers seldom meet at the counter */
 /* How far the network may take a particle from where it saw it, units: differences fit 32 bits. */
 #define FARTHEST (((int64_t)1 << 30) - ((int64_t)1 << 27))
+/* Sweeps look for rows to leave out where less than this share has a pressure: there marks cost less than they save. */
+#define LOOSE 0.25
+/* The same of rows that pushes move: those that are pushed, times how many that is for each with a pressure, are less
+ * than this many times all rows. */
+#define AROUND 2.0
 /* Compressions are summed in integers. */
 #define COMPRESSION_UNIT 0x1p-24
 
@@ -64,6 +70,12 @@ typedef struct relaxation {
     const float *share; /* [count] of rows; NULL = there is one model */
     bool slows;         /* sweeps are on velocities, not densities */
     float repulsion;    /* below this distance, in supports */
+    ascc_active_rows active;
+    bool loose; /* most rows have no pressure: those that are not pushed stay as they are, */
+    bool few;   /* and few are moved, likewise */
+    size_t pressed_first,
+        pressed_last; /* rows with a pressure when marks began anew; behind the last sweep */
+    atomic_size_t pressed, pushed; /* of the sweep under way; rows that it pushes */
     atomic_size_t bad;
     atomic_uint_least64_t compression, largest;
 } relaxation;
@@ -171,7 +183,8 @@ static bool lend_memory(relaxation *r)
         if (!r->smoothing)
             return false;
     }
-    if (!r->sum.uniform && !vector_room(r, r->push, n))
+    if ((!r->sum.uniform && !vector_room(r, r->push, n)) ||
+        (!r->slows && !ascc_active_rows_open(&r->active, arena, n)))
         return false;
     return r->aside && r->scratch && make_room_for_pairs(r);
 }
@@ -566,11 +579,43 @@ static ascc_status open_relaxation(relaxation *r, ascc_step_state *state, bool s
 
 /* ---- Sweeps ---- */
 
+/* Of rows [begin, end) those that are active; the others have none. */
+static void push_active(relaxation *r, const ascc_gradients *pairs, size_t begin, size_t end)
+{
+    size_t pushed = 0;
+    for (size_t i = begin, next; i < end; i = next) {
+        next = ascc_active_run(r->active.pushed, i, end);
+        if (r->active.pushed[i]) {
+            r->state->tools.kernels->push(pairs, i, next, r->pressure, r->push, r->move);
+            pushed += next - i;
+        } else {
+            memset(r->move + i * 4, 0, (next - i) * 4 * sizeof *r->move);
+        }
+    }
+    atomic_fetch_add_explicit(&r->pushed, pushed, memory_order_relaxed);
+}
+
+static void diverge_active(const relaxation *r, const ascc_gradients *pairs, size_t begin,
+                           size_t end)
+{
+    for (size_t i = begin, next; i < end; i = next) {
+        next = ascc_active_run(r->active.moved, i, end);
+        if (r->active.moved[i])
+            r->state->tools.kernels->divergence(pairs, i, next, r->own, r->move, r->change);
+        else
+            memset(r->change + i, 0, (next - i) * sizeof *r->change);
+    }
+}
+
 static void push_rows(void *data, size_t begin, size_t end, int32_t slot)
 {
     (void)slot;
     relaxation *r = data;
     const ascc_gradients pairs = gradients(r);
+    if (r->loose) {
+        push_active(r, &pairs, begin, end);
+        return;
+    }
     r->state->tools.kernels->push(&pairs, begin, end, r->pressure, r->push, r->move);
     for (size_t i = begin; r->state->hierarchy.idle && i < end; i++)
         for (size_t c = 0; is_idle(r, i) && c < 4; c++)
@@ -602,12 +647,18 @@ static void relax_rows(void *data, size_t begin, size_t end, int32_t slot)
     (void)slot;
     relaxation *r = data;
     const ascc_gradients pairs = gradients(r);
-    r->state->tools.kernels->divergence(&pairs, begin, end, r->own, r->move, r->change);
+    size_t pressed = 0;
+    if (r->few)
+        diverge_active(r, &pairs, begin, end);
+    else
+        r->state->tools.kernels->divergence(&pairs, begin, end, r->own, r->move, r->change);
     for (size_t i = begin; i < end; i++) {
         const float pressure =
             r->pressure[i] + omega_of(r, i) * (r->excess[i] + r->change[i]) * r->response[i];
         r->pressure[i] = pressure > 0.0f ? pressure : 0.0f;
+        pressed += pressure > 0.0f;
     }
+    atomic_fetch_add_explicit(&r->pressed, pressed, memory_order_relaxed);
 }
 
 static void guess_rows(void *data, size_t begin, size_t end, int32_t slot)
@@ -624,16 +675,47 @@ static void begin_rows(void *data, size_t begin, size_t end, int32_t slot)
 {
     (void)slot;
     relaxation *r = data;
+    size_t pressed = 0;
     for (size_t i = begin; i < end; i++) {
         const float pressure = omega_of(r, i) * r->excess[i] * r->response[i];
         r->change[i] = 0.0f;
         r->pressure[i] = pressure > 0.0f ? pressure : 0.0f;
+        pressed += pressure > 0.0f;
     }
+    atomic_fetch_add_explicit(&r->pressed, pressed, memory_order_relaxed);
+}
+
+/* Marks rows that the pressures push, where most have none. Rows without a turn of their own cannot mark theirs. */
+static void look_for_active(relaxation *r, const ascc_gradients *pairs)
+{
+    const size_t pressed = atomic_exchange(&r->pressed, 0);
+    if (r->slows || r->state->hierarchy.idle)
+        return;
+    if (r->loose ? 2 * pressed < r->pressed_first : (double)pressed < LOOSE * (double)r->count) {
+        ascc_active_rows_clear(&r->active);
+        r->pressed_first = pressed;
+        r->loose = true;
+    }
+    if (r->loose)
+        ascc_active_rows_press(&r->active, r->state->tools.workers, pairs, r->pressure);
+    r->pressed_last = pressed;
+}
+
+/* Marks rows that the pushes move, if these will be few: where pressures are scattered, rows around them are many, and
+ * around those there are all. */
+static void look_for_moved(relaxation *r, const ascc_gradients *pairs)
+{
+    const double pushed = (double)atomic_exchange(&r->pushed, 0);
+    const double around = pushed * pushed;
+    r->few = r->loose && around < AROUND * (double)r->count * (double)r->pressed_last;
+    if (r->few)
+        ascc_active_rows_move(&r->active, r->state->tools.workers, pairs);
 }
 
 static ascc_status sweep(relaxation *r, const ascc_sweeps *sweeps)
 {
     ascc_workers *workers = r->state->tools.workers;
+    const ascc_gradients pairs = gradients(r);
     ascc_status status = ASCC_OK;
     if (r->guess) {
         ascc_workers_run(workers, r->count, 16 * ROWS, guess_rows, r);
@@ -650,10 +732,12 @@ static ascc_status sweep(relaxation *r, const ascc_sweeps *sweeps)
             status = refresh_move(r);
             if (status != ASCC_OK)
                 return status;
+            look_for_moved(r, &pairs);
             ascc_workers_run(workers, r->count, ROWS, relax_rows, r);
         } else {
             ascc_workers_run(workers, r->count, 16 * ROWS, begin_rows, r);
         }
+        look_for_active(r, &pairs);
         if (r->trace)
             trace_sweep(r, k);
         status = refresh_pressure(r);
@@ -746,6 +830,8 @@ static bool evaluate_kept(ascc_pair_sum *sum, size_t i)
     const relaxation *r = sum->data;
     if (r->near[i] || touches_idle(r, i))
         return false;
+    if (r->loose && !r->active.pushed[i])
+        return true;
     const ascc_gradients pairs = gradients(r);
     const ascc_pressures pressures = {.pressure = r->pressure,
                                       .limit = (float)(r->constants->limit / r->constants->support),
