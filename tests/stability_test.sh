@@ -51,6 +51,14 @@ holds 'a cell out of time does not pass' grep -q 'no failure in 0 of' out
     --scenes 'single particle' --jobs 1 >out 2>err
 holds 'a model file is a method more' grep -qE '^single particle +demo .* pass: 2 of 2' out
 holds 'a file that is not there fails its cells' grep -qE '^single particle +where .* frame 0 of 2: model' out
+for scenes in 'jet at a sheet' 'jet at a sheet;single particle'; do
+    "$stability" --quick --frames 8 --methods ballistic --jobs 1 --keep kept --scenes "$scenes" >out 2>err
+    sed -i 's/128 of 128/all/' kept
+done
+holds 'a run goes on with the cells that are kept' grep -q '^jet at a sheet .* frame 2 of 8: all through$' out
+holds 'and runs and keeps the others' sh -c 'grep -q "^single particle .* pass: 8 of 8" out && [ "$(wc -l <kept)" = 2 ]'
+"$stability" --quick --frames 2 --methods ballistic --jobs 1 --keep kept --scenes 'jet at a sheet' >out 2>err
+holds 'of as many frames only' grep -q ' frame 2 of 2: 128 of 128 through' out
 "$stability" --quick --frames 24 --methods ballistic --model "$models/pbf3d.safetensors" --jobs 1 \
     --scenes 'paddle;thin cup;tap' >out 2>err
 holds 'a paddle leaves nothing behind' grep -qE '^paddle +pbf3d .* pass: 24 of 24' out

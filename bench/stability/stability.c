@@ -3,11 +3,12 @@
  *
  *   stability [--quick] [--shared DIR] [--docs DIR] [--scenes 'A;B'] [--methods 'A;B']
  *             [--model FILE]... [--dimension 2] [--frames N] [--minutes M] [--budget SECONDS]
- *             [--jobs N]
+ *             [--jobs N] [--keep FILE]
  *
  * The whole may take M minutes on idle cores. A cell may use four times its part of the time that is left,
  * since most end early, the last ones a third of it. Scenes of few frames come first, so the long ones get
  * nearly all; in a scene the methods at the end of the table, which are cheap, and models given.
+ * With --keep a run that was stopped goes on: cells that the file has are taken from there, others added.
  */
 #define _DEFAULT_SOURCE /* MAP_ANONYMOUS, getloadavg */
 #include <glob.h>
@@ -22,6 +23,7 @@
 #include <unistd.h>
 
 #include "evaluate.h"
+#include "kept.h"
 #include "suite.h"
 
 /* Name, method; @ is the folder of shared data, whose models are in 3D. */
@@ -39,7 +41,7 @@ static const char *const methods[][2] = {
 enum { METHODS = sizeof methods / sizeof *methods, MOST_METHODS = 32, MOST_SCENES = 64 };
 
 typedef struct suite {
-    const char *shared, *docs, *only_scenes, *only_methods;
+    const char *shared, *docs, *only_scenes, *only_methods, *keep;
     bool quick;
     int dimension;
     long frames;
@@ -156,8 +158,12 @@ static void run_cell(const suite *s, board *b, size_t i, size_t j)
                 .budget = share(s, b),
                 .start = (double)clock() / CLOCKS_PER_SEC};
     c->method = ascc_method_find(s->words[j], &c->settings);
-    s->scene[i]->run(c);
-    b->seconds[i][j] = (double)clock() / CLOCKS_PER_SEC - c->start;
+    if (!s->keep || !kept_find(s->keep, s->scene[i]->name, s->method[j], c, &b->seconds[i][j])) {
+        s->scene[i]->run(c);
+        b->seconds[i][j] = (double)clock() / CLOCKS_PER_SEC - c->start;
+        if (s->keep && !kept_add(s->keep, s->scene[i]->name, s->method[j], c, b->seconds[i][j]))
+            fprintf(stderr, "stability: cannot write to %s\n", s->keep);
+    }
     atomic_fetch_add(&b->spent, (long long)(1e6 * b->seconds[i][j]));
     atomic_fetch_add(&b->ended, 1);
 }
@@ -382,6 +388,8 @@ static bool read_option(suite *s, const char *name, const char *value)
         s->shared = value;
     else if (strcmp(name, "--docs") == 0)
         s->docs = value;
+    else if (strcmp(name, "--keep") == 0)
+        s->keep = value;
     else if (strcmp(name, "--scenes") == 0)
         s->only_scenes = value;
     else if (strcmp(name, "--methods") == 0)
@@ -416,7 +424,7 @@ int main(int argc, char **argv)
             fputs("usage: stability [--quick] [--shared DIR] [--docs DIR] [--scenes 'A;B']\n"
                   "                 [--methods 'A;B'] [--model FILE]... [--dimension 2] [--frames "
                   "N]\n"
-                  "                 [--minutes M] [--budget SECONDS] [--jobs N]\n",
+                  "                 [--minutes M] [--budget SECONDS] [--jobs N] [--keep FILE]\n",
                   stderr);
             return 2;
         }
