@@ -323,6 +323,33 @@ report $? 'a published network can be trained on'
 LC_ALL=C sed 's/poly6/poly7/' published >unknown && sed 's/"published"/"unknown"/' published.json >unknown.json
 refuses 1 "unknown: architecture 'conv': 'window' is not understood" train unknown.json
 
+# ---- The mean of two networks' weights ----
+
+average() { python3 "$source/examples/train/average.py" "$@" >out 2>err; }
+
+# Of every number: a quarter of the one, three quarters of the other, in doubles, and no other byte.
+is_mean() {
+    python3 - "$@" <<'END'
+import struct, sys
+raw = [open(path, "rb").read() for path in sys.argv[1:4]]
+end = 8 + struct.unpack("<Q", raw[0][:8])[0]
+count = (len(raw[0]) - end) // 4
+mean, one, two = (struct.unpack(f"<{count}f", r[end:]) for r in raw)
+far = max(abs(m - 0.25 * a - 0.75 * b) for m, a, b in zip(mean, one, two))
+assert raw[0][:end] == raw[1][:end] and one != two and far < 1e-7, far
+END
+}
+
+cp learned.safetensors one.safetensors
+sed -e 's/"published"/"one.safetensors"/' -e 's/"learned.safetensors"/"two.safetensors"/' published.json >two.json
+run train two.json
+average mean.safetensors one.safetensors=0.25 two.safetensors=0.75
+holds 'average.py gives the mean of weights' is_mean mean.safetensors one.safetensors two.safetensors
+holds 'which is a network' "$ascc" info mean.safetensors
+average none.safetensors one.safetensors=0.25 two.safetensors=0.5
+[ $? -ne 0 ] && [ ! -e none.safetensors ] && grep -q 'not 1 in all' err
+report $? 'shares that are not 1 in all are refused'
+
 # ---- The examples are configs that the program understands ----
 
 for example in "$source"/examples/train/*.json; do

@@ -14,6 +14,9 @@ mkdir -p "$out"
 "$ascc" generate free-fall -o "$out" --dimension 3 --seed 5 --count 2 --frames 40 --spacing 0.05 --solver sph
 "$ascc" generate still-tank -o "$out" --dimension 3 --seed 77 --count 8 --frames 60 --spacing 0.05
 "$ascc" generate still-column -o "$out" --dimension 3 --seed 77 --count 2 --frames 60 --spacing 0.05
+for bodies in "held-body 6" "floating-body 6" "sinking-body 6" "paddle 4"; do
+    "$ascc" generate "${bodies% *}" -o "$out" --seed 31 --count "${bodies#* }" --frames 60 --threads "$threads"
+done
 
 . ./range.sh
 kind liquid3d 30
