@@ -456,14 +456,14 @@ const stability_scene stability_scenes[] = {
      "the box",
      40, 200, sharp_edge},
     {"light body",
-     "a cube of half the fluid's density, held, then free for as long: no escape, up by a spacing",
+     "a cube of half the fluid's density (2D: its points behind its surface as docs/bodies.md "
+     "says), held, then free for as long: no escape, up by a spacing",
      40, 200, stability_light_body},
     {"heavy body", "twice the density: down, by at most 0.8 of a free fall", 40, 200,
      stability_heavy_body},
     {"held box",
-     "a cube of 4 spacings, its points 0.6 spacings (2D: 1) behind its surface: no escape; in the "
-     "last "
-     "third it receives the weight of as much water within 5 %",
+     "a cube of 4 spacings, its points 0.6 spacings (2D: 1, to reference solvers 0.5) behind its "
+     "surface: no escape; in the last third it receives the weight of as much water within 5 %",
      150, 300, stability_held_box},
     {"thin cup",
      "a cup of one sheet in water, fuller than the water around it: nothing in, nothing out, "
@@ -483,8 +483,8 @@ const stability_scene stability_scenes[] = {
      "the box",
      40, 200, stability_turned_tank},
     {"tap",
-     "fluid falls into a tank: no escape; as many as the rate says; no pair ever nearer than "
-     "spacing / 5; "
+     "fluid falls into a tank: no escape; as many as the rate says; a pair nearer than spacing / 5 "
+     "in at most one frame of 20, which is what DFSPH keeps; "
      "in the end mean density within 3 % of that of as much fluid that was there from the "
      "beginning, "
      "away from walls and surface",
