@@ -131,13 +131,21 @@ static int start(ascc_mpi_particles *set, bool sends, unsigned char *bytes, cons
     return pending;
 }
 
-static void transfer(ascc_mpi_particles *set, const size_t *out, const size_t *in, size_t size)
+/* Receives from all and sends to all; how many messages are under way. */
+static int post(ascc_mpi_particles *set, const size_t *out, const size_t *in, size_t size)
 {
     const double begin = MPI_Wtime();
     MPI_Request *request = set->pending.at;
     int pending = start(set, false, set->incoming.at, in, size, request);
     pending += start(set, true, set->outgoing.at, out, size, request + pending);
-    MPI_Waitall(pending, request, MPI_STATUSES_IGNORE);
+    set->statistics.seconds += MPI_Wtime() - begin;
+    return pending;
+}
+
+static void wait_for(ascc_mpi_particles *set, int pending)
+{
+    const double begin = MPI_Wtime();
+    MPI_Waitall(pending, set->pending.at, MPI_STATUSES_IGNORE);
     set->statistics.seconds += MPI_Wtime() - begin;
 }
 
@@ -182,7 +190,7 @@ ascc_status ascc_mpi_swap(ascc_mpi_particles *set, size_t size, size_t *received
     }
     const ascc_status status = ascc_mpi_agree(set, explain(set, make_room(set, out, in, size)));
     if (status == ASCC_OK)
-        transfer(set, out, in, size);
+        wait_for(set, post(set, out, in, size));
     return status;
 }
 
@@ -213,48 +221,81 @@ ascc_status ascc_mpi_share(ascc_mpi_particles *set, const void *rows, size_t cou
     return ASCC_OK;
 }
 
-static void pack(const ascc_mpi_lists *lists, const uint32_t *map, const ascc_halo_rows *arrays,
-                 size_t count, size_t ranks, unsigned char *to)
+/* ---- Refresh ---- */
+
+static void pack(const ascc_mpi_refresh *refresh, size_t ranks, unsigned char *to)
 {
-    const uint32_t *list = lists->row.at;
+    const ascc_mpi_lists *lists = &refresh->ghosts->send;
+    const uint32_t *list = lists->row.at, *map = refresh->map;
     for (size_t i = 0; i < lists->start[ranks]; i++) {
         const size_t row = map ? map[list[i]] : list[i];
-        for (size_t a = 0; a < count; to += arrays[a++].size)
-            memcpy(to, (unsigned char *)arrays[a].rows + row * arrays[a].size, arrays[a].size);
+        for (size_t a = 0; a < refresh->of.count; to += refresh->of.arrays[a++].size)
+            memcpy(to,
+                   (unsigned char *)refresh->of.arrays[a].rows + row * refresh->of.arrays[a].size,
+                   refresh->of.arrays[a].size);
     }
 }
 
-static void unpack(const ascc_mpi_lists *lists, const uint32_t *map, const ascc_halo_rows *arrays,
-                   size_t count, size_t ranks, const unsigned char *from)
+static void unpack(const ascc_mpi_refresh *refresh, size_t ranks, const unsigned char *from)
 {
-    const uint32_t *list = lists->row.at;
+    const ascc_mpi_lists *lists = &refresh->ghosts->receive;
+    const uint32_t *list = lists->row.at, *map = refresh->map;
     for (size_t i = 0; i < lists->start[ranks]; i++) {
         const size_t row = map ? map[list[i]] : list[i];
-        for (size_t a = 0; a < count; from += arrays[a++].size)
-            memcpy((unsigned char *)arrays[a].rows + row * arrays[a].size, from, arrays[a].size);
+        for (size_t a = 0; a < refresh->of.count; from += refresh->of.arrays[a++].size)
+            memcpy((unsigned char *)refresh->of.arrays[a].rows + row * refresh->of.arrays[a].size,
+                   from, refresh->of.arrays[a].size);
     }
 }
 
-ascc_status ascc_mpi_refresh(ascc_halo *halo, int set_number, const uint32_t *row,
-                             const ascc_halo_rows *arrays, size_t count)
+static const ascc_mpi_ghosts *ghosts_of(const ascc_mpi_particles *set, int32_t of)
+{
+    return &set->ghosts[of == ASCC_SET_FLUID ? 0 : of - ASCC_SET_LEVEL + 1];
+}
+
+size_t ascc_mpi_sent(ascc_halo *halo, int32_t of, const uint32_t **rows)
+{
+    const ascc_mpi_particles *set = ascc_mpi_of_halo(halo);
+    const ascc_mpi_lists *send = &ghosts_of(set, of)->send;
+    *rows = send->row.at;
+    return send->start[set->size];
+}
+
+ascc_status ascc_mpi_send(ascc_halo *halo, const ascc_halo_refresh *refresh, const uint32_t *map)
 {
     ascc_mpi_particles *set = ascc_mpi_of_halo(halo);
-    const int level = set_number == ASCC_SET_FLUID ? 0 : set_number - ASCC_SET_LEVEL + 1;
-    const ascc_mpi_ghosts *ghosts = &set->ghosts[level];
+    const ascc_mpi_ghosts *ghosts = ghosts_of(set, refresh->set);
     const size_t ranks = (size_t)set->size;
     size_t *out = set->counts, *in = set->counts + ranks, size = 0;
-    for (size_t a = 0; a < count; a++)
-        size += arrays[a].size;
+    for (size_t a = 0; a < refresh->count; a++)
+        size += refresh->arrays[a].size;
     for (size_t r = 0; r < ranks; r++) {
         out[r] = ghosts->send.start[r + 1] - ghosts->send.start[r];
         in[r] = ghosts->receive.start[r + 1] - ghosts->receive.start[r];
     }
-    const ascc_status status = ascc_mpi_agree(set, explain(set, make_room(set, out, in, size)));
-    if (status != ASCC_OK)
-        return status;
-    pack(&ghosts->send, row, arrays, count, ranks, set->outgoing.at);
-    transfer(set, out, in, size);
-    unpack(&ghosts->receive, row, arrays, count, ranks, set->incoming.at);
-    set->statistics.refreshes++;
+    if (!refresh->sure) { /* there is room for those that are, from then on */
+        const size_t most = ascc_max_size(size, ASCC_HALO_SURE);
+        const ascc_status status = ascc_mpi_agree(set, explain(set, make_room(set, out, in, most)));
+        if (status != ASCC_OK)
+            return status;
+    }
+    set->refresh = (ascc_mpi_refresh){.of = *refresh, .ghosts = ghosts, .map = map};
+    pack(&set->refresh, ranks, set->outgoing.at);
+    set->refresh.pending = post(set, out, in, size);
     return ASCC_OK;
+}
+
+void ascc_mpi_poll(ascc_halo *halo)
+{
+    ascc_mpi_particles *set = ascc_mpi_of_halo(halo);
+    int done;
+    MPI_Testall(set->refresh.pending, set->pending.at, &done, MPI_STATUSES_IGNORE);
+}
+
+void ascc_mpi_receive(ascc_halo *halo)
+{
+    ascc_mpi_particles *set = ascc_mpi_of_halo(halo);
+    wait_for(set, set->refresh.pending);
+    unpack(&set->refresh, (size_t)set->size, set->incoming.at);
+    set->statistics.refreshes++;
 }

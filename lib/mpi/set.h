@@ -32,6 +32,14 @@ typedef struct ascc_mpi_pair {
     uint32_t rank, row;
 } ascc_mpi_pair;
 
+/* Messages under way. */
+typedef struct ascc_mpi_refresh {
+    ascc_halo_refresh of;
+    const ascc_mpi_ghosts *ghosts;
+    const uint32_t *map; /* NULL: rows of the host are those of the arrays */
+    int pending;
+} ascc_mpi_refresh;
+
 struct ascc_mpi_particles {
     uint32_t magic;
     ascc_halo halo;
@@ -63,6 +71,7 @@ struct ascc_mpi_particles {
     bool accelerates; /* some process has given an acceleration */
     bool stopped;     /* a process has failed */
     bool by_other;    /* and this one has not */
+    ascc_mpi_refresh refresh;
     ascc_mpi_statistics statistics;
     ascc_message message;
 };
@@ -115,8 +124,11 @@ ascc_status ascc_mpi_swap(ascc_mpi_particles *set, size_t size, size_t *received
 /* Rows of all processes in set->incoming, one after another. errors: those of any process. */
 ascc_status ascc_mpi_share(ascc_mpi_particles *set, const void *rows, size_t count, size_t size,
                            size_t *all);
-ascc_status ascc_mpi_refresh(ascc_halo *halo, int set, const uint32_t *row,
-                             const ascc_halo_rows *arrays, size_t count);
+/* What a halo has of that name (points/halo.h). */
+size_t ascc_mpi_sent(ascc_halo *halo, int32_t of, const uint32_t **rows);
+ascc_status ascc_mpi_send(ascc_halo *halo, const ascc_halo_refresh *refresh, const uint32_t *map);
+void ascc_mpi_poll(ascc_halo *halo);
+void ascc_mpi_receive(ascc_halo *halo);
 
 /* ---- rows.c: rows of fluid as bytes ---- */
 

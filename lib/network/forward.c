@@ -6,6 +6,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "early_rows.h"
 #include "network.h"
 
 typedef struct layer_job {
@@ -19,6 +20,7 @@ typedef struct layer_job {
     ascc_scratch_sizes sizes;
     uint32_t *sequence; /* 0, 1, 2, ... */
     bool drift;         /* of walls' motions */
+    int32_t fresh;      /* the value whose ghosts can be refreshed meanwhile; 0 = none */
 } layer_job;
 
 ascc_scratch_sizes ascc_network_sizes(const ascc_network_run *run, const ascc_layer *layer)
@@ -300,10 +302,80 @@ static ascc_status no_memory(const ascc_network_run *run, const ascc_layer *laye
     return ascc_fail(run->tools->message, ASCC_ERROR_MEMORY, "no memory for layer %s", layer->name);
 }
 
+/* ---- What other processes computed ---- */
+
+/* Is the value read through neighbour lists? */
+static bool is_read_around(const ascc_network *network, int32_t v)
+{
+    bool read = false;
+    for (int32_t t = 0; t <= network->plan->term_count; t++)
+        read |= ascc_plan_term(network->plan, t)->source == v && network->term_key[t][0] >= 0;
+    return read;
+}
+
+static bool is_exchanged(const ascc_network_run *run, int32_t l)
+{
+    return run->hierarchy->halo && !ascc_network_passes_on(run->network, l) &&
+           is_read_around(run->network, l + 2);
+}
+
+static void refresh_of(const ascc_network_run *run, int32_t v, ascc_halo_refresh *refresh)
+{
+    const ascc_value *value = &run->value[v];
+    const size_t size = ascc_padded(ascc_network_channels(run->network, v)) * sizeof(float);
+    float *const copies[3] = {value->raw, value->rectified, value->drift};
+    *refresh = (ascc_halo_refresh){.set = ascc_network_set(run->network, v)};
+    for (int i = 0; i < 3; i++)
+        if (copies[i])
+            refresh->arrays[refresh->count++] = (ascc_halo_rows){copies[i], size};
+}
+
+/* All rows hold numbers now. */
+static void note_fresh(ascc_network_run *run, int32_t v)
+{
+    ascc_value *value = &run->value[v];
+    memset(value->active, 1, ascc_network_rows(run, ascc_network_set(run->network, v)));
+    value->fresh = true;
+}
+
+/* The value that is complete, and can be sent, when a tile of layer l is computed: its own, or that of the one layer
+ * that it is passed on to. 0 = none; what walls carry comes afterwards. */
+static int32_t sent_with(const ascc_network_run *run, int32_t l)
+{
+    const ascc_plan *plan = run->plan;
+    const bool passed_on = ascc_network_passes_on(run->network, l);
+    int32_t value = passed_on ? 0 : l + 2;
+    for (int32_t m = l + 1; passed_on && m < plan->layer_count; m++)
+        if (reads_tiles(plan, m, l))
+            value = value || plan->layer[m].term_count > 1 ? -1 : m + 2;
+    return value > 0 && is_exchanged(run, value - 2) &&
+                   !(run->network->wants[value] & ASCC_WANTS_DRIFT && run->value[1].drift)
+               ? value
+               : 0;
+}
+
+/* Lists the active rows of a set in the order of its rows (early_rows.h). */
+static size_t list_in_order(const ascc_hierarchy *h, int32_t set, const uint8_t *active,
+                            uint32_t *list, size_t *early)
+{
+    const ascc_row_order *order = &h->order[set == ASCC_SET_FLUID ? 0 : set - ASCC_SET_LEVEL + 1];
+    size_t count = 0;
+    *early = 0;
+    for (size_t k = 0; k < order->count; k++) {
+        if (k == order->early)
+            *early = count;
+        for (uint32_t i = order->range[k].begin; i < order->range[k].end; i++)
+            if (active[i])
+                list[count++] = i;
+    }
+    *early = order->early == order->count ? count : *early;
+    return count;
+}
+
 /* The layer of a job tile by tile, in scratch that is lent. next_width: of values that are given a tile. */
 static ascc_status run_job(layer_job *job, uint32_t *list, size_t next_width)
 {
-    const ascc_network_run *run = job->run;
+    ascc_network_run *run = job->run;
     const ascc_layer *layer = job->layer;
     const ascc_search_tools *tools = run->tools;
     const size_t slots = (size_t)ascc_workers_count(tools->workers);
@@ -322,11 +394,22 @@ static ascc_status run_job(layer_job *job, uint32_t *list, size_t next_width)
     if (!job->scratch || !job->sequence)
         return no_memory(run, layer);
     const int32_t value = (int32_t)(layer - run->plan->layer) + 2;
-    const size_t count =
-        list_active(tools, run->value[value].active, ascc_network_rows(run, layer->set), list);
-    ascc_workers_run(tools->workers, count, ASCC_TILE_ROWS * 4, compute_tiles, job);
+    const uint8_t *active = run->value[value].active;
+    size_t count, early = 0;
+    ascc_halo_refresh refresh;
+    if (job->fresh)
+        count = list_in_order(run->hierarchy, layer->set, active, list, &early);
+    else
+        count = list_active(tools, active, ascc_network_rows(run, layer->set), list);
+    if (job->fresh)
+        refresh_of(run, job->fresh, &refresh);
+    const ascc_status status =
+        ascc_early_list_run(run->hierarchy, tools, early, count, ASCC_TILE_ROWS * 4, compute_tiles,
+                            job, job->fresh ? &refresh : NULL);
     ascc_arena_return(tools->arena, mark);
-    return ASCC_OK;
+    if (job->fresh && status == ASCC_OK)
+        note_fresh(run, job->fresh);
+    return status;
 }
 
 static ascc_status compute_layer(ascc_network_run *run, int32_t l, uint32_t *list)
@@ -343,6 +426,7 @@ static ascc_status compute_layer(ascc_network_run *run, int32_t l, uint32_t *lis
         return status;
     if (!take_values(run, l, passed_on, &next_width))
         return no_memory(run, layer);
+    job.fresh = sent_with(run, l);
     return run_job(&job, list, next_width);
 }
 
@@ -396,35 +480,17 @@ static ascc_status carry_layer(ascc_network_run *run, int32_t l, uint32_t *list)
     return status;
 }
 
-/* ---- What other processes computed ---- */
-
-/* Is the value read through neighbour lists? */
-static bool is_read_around(const ascc_network *network, int32_t v)
+/* Ghosts of a layer's value, if they have not travelled while it was computed. */
+static ascc_status refresh_value(ascc_network_run *run, int32_t l)
 {
-    bool read = false;
-    for (int32_t t = 0; t <= network->plan->term_count; t++)
-        read |= ascc_plan_term(network->plan, t)->source == v && network->term_key[t][0] >= 0;
-    return read;
-}
-
-/* Ghosts of a layer's value, once it is computed. */
-static ascc_status refresh_value(const ascc_network_run *run, int32_t l)
-{
-    const ascc_network *network = run->network;
-    const ascc_value *value = &run->value[l + 2];
-    const size_t size = ascc_padded(ascc_network_channels(network, l + 2)) * sizeof(float);
-    float *const copies[3] = {value->raw, value->rectified, value->drift};
-    ascc_halo_rows arrays[3];
-    size_t count = 0;
-    if (!run->hierarchy->halo || ascc_network_passes_on(network, l) ||
-        !is_read_around(network, l + 2))
+    ascc_halo_refresh refresh;
+    if (!is_exchanged(run, l) || run->value[l + 2].fresh)
         return ASCC_OK;
-    for (int i = 0; i < 3; i++)
-        if (copies[i])
-            arrays[count++] = (ascc_halo_rows){copies[i], size};
-    memset(value->active, 1,
-           ascc_network_rows(run, run->plan->layer[l].set)); /* all hold numbers now */
-    return ascc_hierarchy_refresh(run->hierarchy, run->plan->layer[l].set, arrays, count);
+    refresh_of(run, l + 2, &refresh);
+    const ascc_status status = ascc_hierarchy_refresh(run->hierarchy, &refresh);
+    if (status == ASCC_OK)
+        note_fresh(run, l + 2);
+    return status;
 }
 
 static void keep_guess(void *data, size_t begin, size_t end, int32_t slot)

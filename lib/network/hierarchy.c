@@ -1,6 +1,6 @@
 /* Builds the point sets of one step: sorts level 0, samples the coarser levels.
  * SPDX-License-Identifier: MIT */
-#include "hierarchy.h"
+#include "early_rows.h"
 
 #include <math.h>
 #include <string.h>
@@ -294,7 +294,7 @@ static ascc_status find_halo_rows(ascc_hierarchy *h, const ascc_search_tools *to
         return ascc_fail(tools->message, ASCC_ERROR_MEMORY, "no memory for %zu rows", count);
     for (size_t i = 0; i < count; i++)
         h->halo_row[ascc_hierarchy_host_row(h, ASCC_SET_FLUID, i)] = (uint32_t)i;
-    return ASCC_OK;
+    return ascc_early_rows_find(h, tools, ASCC_SET_FLUID);
 }
 
 static ascc_status build_level(ascc_hierarchy *h, const ascc_search_tools *tools,
@@ -313,11 +313,13 @@ static ascc_status build_level(ascc_hierarchy *h, const ascc_search_tools *tools
     if (h->halo) {
         if (!lend_own(&own, h, tools, all))
             return ascc_fail(tools->message, ASCC_ERROR_MEMORY, "no memory for coarse points");
-        const ascc_status status =
+        ascc_status status =
             ascc_sample_corners(samples, tools, &own, plan->dimension, voxel, 0.0, anchor);
-        return status == ASCC_OK
-                   ? h->halo->corners(h->halo, level, h->scale.unit, tools, samples, &h->own[level])
-                   : status;
+        if (status == ASCC_OK)
+            status =
+                h->halo->corners(h->halo, level, h->scale.unit, tools, samples, &h->own[level]);
+        return status == ASCC_OK ? ascc_early_rows_find(h, tools, ASCC_SET_LEVEL + level - 1)
+                                 : status;
     }
     if (plan->centroid_anchor)
         ascc_centroid(all, anchor);

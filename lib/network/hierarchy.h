@@ -9,6 +9,16 @@
 
 #define ASCC_MAX_GRIDS 64
 
+/* With a halo: the rows of a set in the order in which they are computed (early_rows.h). */
+typedef struct ascc_row_range {
+    uint32_t begin, end;
+} ascc_row_range;
+
+typedef struct ascc_row_order {
+    ascc_row_range *range; /* [count] the first `early` hold all that is sent */
+    size_t early, count;
+} ascc_row_order;
+
 typedef struct ascc_hierarchy {
     ascc_scale scale;
     ascc_points
@@ -25,7 +35,8 @@ typedef struct ascc_hierarchy {
     bool joins;         /* only the output's impulses are wanted: no relaxation follows */
     ascc_halo *halo;    /* of fluid that other processes have, idle here; NULL = they have none */
     uint32_t *halo_row; /* with a halo: [host's fluid row] its row of the fluid */
-    const uint8_t *own[ASCC_MAX_LEVELS]; /* with a halo: [rows of level] 1 = computed here */
+    const uint8_t *own[ASCC_MAX_LEVELS];   /* with a halo: [rows of level] 1 = computed here */
+    ascc_row_order order[ASCC_MAX_LEVELS]; /* with a halo: of fluid, then of levels */
     float *
         drift; /* motions of walls in spacings a time step, [boundary set row][4]; NULL: all rest */
     struct ascc_sheets
@@ -92,14 +103,23 @@ static inline size_t ascc_hierarchy_wall_row(const ascc_hierarchy *hierarchy, si
     return ascc_hierarchy_host_row(hierarchy, ASCC_SET_BOUNDARY, row) - hierarchy->fluid_count;
 }
 
-/* Ghosts of a set become what their owners have, in arrays of its rows; nothing without a halo. */
-static inline ascc_status ascc_hierarchy_refresh(const ascc_hierarchy *hierarchy, int32_t set,
-                                                 const ascc_halo_rows *arrays, size_t count)
+/* Of a set's rows, with a halo only: sends them, for halo->receive to end; or all of it, nothing without a halo. */
+static inline ascc_status ascc_hierarchy_send(const ascc_hierarchy *hierarchy,
+                                              const ascc_halo_refresh *refresh)
 {
-    ascc_halo *halo = hierarchy->halo;
-    return halo ? halo->refresh(halo, set, set == ASCC_SET_FLUID ? hierarchy->halo_row : NULL,
-                                arrays, count)
-                : ASCC_OK;
+    return hierarchy->halo->send(hierarchy->halo, refresh,
+                                 refresh->set == ASCC_SET_FLUID ? hierarchy->halo_row : NULL);
+}
+
+static inline ascc_status ascc_hierarchy_refresh(const ascc_hierarchy *hierarchy,
+                                                 const ascc_halo_refresh *refresh)
+{
+    if (!hierarchy->halo)
+        return ASCC_OK;
+    const ascc_status status = ascc_hierarchy_send(hierarchy, refresh);
+    if (status == ASCC_OK)
+        hierarchy->halo->receive(hierarchy->halo);
+    return status;
 }
 
 #endif

@@ -63,6 +63,7 @@ typedef struct ascc_value {
     float *rectified; /* or NULL */
     float
         *drift; /* of walls' motions in place of their normals and nothing else; NULL: none moves */
+    bool fresh; /* with a halo: ghosts are what their owners have */
 } ascc_value;
 
 typedef struct ascc_network_run {

@@ -26,6 +26,16 @@ typedef struct ascc_halo_rows {
     size_t size;
 } ascc_halo_rows;
 
+/* Ghosts of a set, fluid or a level, become what their owners have in arrays of its rows. sure: no process can have
+ * failed since the last refresh of the same set, and a row has ASCC_HALO_SURE bytes at most. */
+#define ASCC_HALO_SURE 64
+typedef struct ascc_halo_refresh {
+    int32_t set;
+    bool sure;
+    size_t count;
+    ascc_halo_rows arrays[3];
+} ascc_halo_refresh;
+
 typedef struct ascc_halo ascc_halo;
 
 struct ascc_halo {
@@ -47,10 +57,15 @@ struct ascc_halo {
 
     /* OK if all processes say so. After a failure of any, nobody waits for another in this run. */
     ascc_status (*agree)(ascc_halo *halo, ascc_status own);
-    /* Ghosts become what their owners have, in `count` arrays of rows. set: fluid or a level. row: of each host's row
-     * of the fluid its row in the arrays; NULL = the same, as of levels always. errors: those of any process. */
-    ascc_status (*refresh)(ascc_halo *halo, int set, const uint32_t *row,
-                           const ascc_halo_rows *arrays, size_t count);
+    /* The rows whose copies are ghosts elsewhere, some several times: of the host's fluid, or of a level. */
+    size_t (*sent)(ascc_halo *halo, int32_t set, const uint32_t **rows);
+    /* A refresh begins: rows that are sent are final, and the others may be written until `receive`, with which it ends.
+     * row: of each host's row of the fluid its row in the arrays; NULL = the same, as of levels always. errors: those
+     * of any process; then it has not begun. */
+    ascc_status (*send)(ascc_halo *halo, const ascc_halo_refresh *refresh, const uint32_t *row);
+    void (*poll)(
+        ascc_halo *halo); /* now and then between both: messages travel while MPI is called */
+    void (*receive)(ascc_halo *halo);
     /* The corners of a level that this process needs, of those that it and the others found, in the order of
      * samples; which are its own. unit: m of a unit. errors: MEMORY. */
     ascc_status (*corners)(ascc_halo *halo, int level, double unit, const ascc_search_tools *tools,

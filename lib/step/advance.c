@@ -96,10 +96,17 @@ static ascc_status advance_all(ascc_step_state *state, const int64_t *impulse, b
 ascc_status ascc_advance_refresh(ascc_step_state *state)
 {
     const size_t size = (size_t)state->particles->dimension * 8;
-    const ascc_halo_rows arrays[] = {{state->advance.position, size},
-                                     {state->advance.momentum, size}};
-    return state->halo ? state->halo->refresh(state->halo, ASCC_SET_FLUID, NULL, arrays, 2)
-                       : ASCC_OK;
+    const ascc_halo_refresh refresh = {
+        ASCC_SET_FLUID,
+        false,
+        2,
+        {{state->advance.position, size}, {state->advance.momentum, size}}};
+    if (!state->halo)
+        return ASCC_OK;
+    const ascc_status status = state->halo->send(state->halo, &refresh, NULL);
+    if (status == ASCC_OK)
+        state->halo->receive(state->halo);
+    return status;
 }
 
 ascc_status ascc_stage_advance(ascc_step_state *state)

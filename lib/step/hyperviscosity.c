@@ -15,6 +15,8 @@
  */
 #include "hyperviscosity.h"
 
+#include "network/early_rows.h"
+
 #include <inttypes.h>
 #include <math.h>
 #include <string.h>
@@ -27,6 +29,7 @@ typedef struct sweep {
     ascc_gradients pairs;    /* with weights, once they are known */
     float *weigh;            /* else where they go */
     float bound, share;
+    int32_t k; /* of sweeps */
     bool last;
     /* Rows of 4: velocities and coefficients; R; S; what a sweep takes. */
     float *velocity, *rough, *sum, *taken;
@@ -123,26 +126,35 @@ static void differ(const sweep *w, size_t begin, size_t end, const float *of, fl
             to[i * 4 + c] *= (float)(w->heaviest / s->sum->mass[i]);
 }
 
+/* One factor a row, so that no sweep adds energy. */
+static void fade_row(const sweep *w, float *rough)
+{
+    const float square = rough[0] * rough[0] + rough[1] * rough[1] + rough[2] * rough[2];
+    const float left = 1.0f - square / (w->bound * w->bound);
+    const float share = left > 0.0f ? left * left : 0.0f;
+    for (size_t c = 0; c < 3; c++)
+        rough[c] *= share;
+}
+
+/* Sweep k has begun with these velocities and found this roughness. */
+static void trace_rows(const sweep *w, size_t begin, size_t end)
+{
+    const ascc_relaxation_trace *t = w->of->trace;
+    const size_t first = (size_t)w->k * w->of->count * 4 + begin * 4;
+    const size_t size = (end - begin) * 4 * sizeof *w->velocity;
+    memcpy(t->smoothed + first, w->velocity + begin * 4, size);
+    memcpy(t->rough + first, w->rough + begin * 4, size);
+}
+
 static void rough_rows(void *data, size_t begin, size_t end, int32_t slot)
 {
     (void)slot;
     const sweep *w = data;
     differ(w, begin, end, w->velocity, w->rough);
-}
-
-/* One factor a row, so that no sweep adds energy. */
-static void fade_rows(void *data, size_t begin, size_t end, int32_t slot)
-{
-    (void)slot;
-    const sweep *w = data;
-    for (size_t i = begin; i < end; i++) {
-        float *r = w->rough + i * 4;
-        const float square = r[0] * r[0] + r[1] * r[1] + r[2] * r[2];
-        const float left = 1.0f - square / (w->bound * w->bound);
-        const float share = left > 0.0f ? left * left : 0.0f;
-        for (size_t c = 0; c < 3; c++)
-            r[c] *= share;
-    }
+    if (w->of->trace)
+        trace_rows(w, begin, end);
+    for (size_t i = begin; i < end; i++)
+        fade_row(w, w->rough + i * 4);
 }
 
 static void smooth_rows(void *data, size_t begin, size_t end, int32_t slot)
@@ -191,40 +203,27 @@ static bool evaluate(ascc_pair_sum *sum, size_t i)
     return true;
 }
 
-/* Sweep k has begun with these velocities and found this roughness. */
-static void trace_sweep(const sweep *w, int32_t k)
+/* Computes rows and refreshes ghosts of what it writes. sure: nothing can have failed since the last time. */
+static ascc_status run_rows(sweep *w, ascc_range_function function, float *writes, bool sure)
 {
-    const ascc_relaxation_trace *t = w->of->trace;
-    const size_t numbers = w->of->count * 4;
-    memcpy(t->smoothed + (size_t)k * numbers, w->velocity, numbers * sizeof *w->velocity);
-    memcpy(t->rough + (size_t)k * numbers, w->rough, numbers * sizeof *w->rough);
+    const ascc_halo_refresh refresh = {ASCC_SET_FLUID, sure, 1, {{writes, 4 * sizeof *writes}}};
+    return ascc_early_rows_run(&w->of->state->hierarchy, &w->of->state->tools, ROWS, function, w,
+                               &refresh);
 }
 
-/* Ghosts' rows, as their owners have them. */
-static ascc_status refresh(const sweep *w, float *of)
-{
-    const ascc_halo_rows rows = {of, 4 * sizeof *of};
-    return ascc_hierarchy_refresh(&w->of->state->hierarchy, ASCC_SET_FLUID, &rows, 1);
-}
-
-static ascc_status smooth(sweep *w, int32_t k)
+static void smooth(sweep *w)
 {
     const ascc_smoothing *s = w->of;
-    ascc_workers *workers = s->state->tools.workers;
     const ascc_sweeps *sweeps = &s->state->relaxation->viscosity;
-    w->share = (float)ascc_smoothing_share(s->state, sweeps->omega[k]);
-    w->last = k + 1 == sweeps->count;
-    ascc_workers_run(workers, s->count, ROWS, rough_rows, w);
+    w->share = (float)ascc_smoothing_share(s->state, sweeps->omega[w->k]);
+    w->last = w->k + 1 == sweeps->count;
+    (void)run_rows(w, rough_rows, w->rough, true);
     w->pairs.weight = s->weight;
     w->weigh = NULL;
-    if (s->trace)
-        trace_sweep(w, k);
-    ascc_workers_run(workers, s->count, 4 * ROWS, fade_rows, w);
-    const ascc_status status = refresh(w, w->rough);
-    if (status != ASCC_OK)
-        return status;
-    ascc_workers_run(workers, s->count, ROWS, smooth_rows, w);
-    return w->last ? ASCC_OK : refresh(w, w->velocity);
+    if (w->last)
+        ascc_workers_run(s->state->tools.workers, s->count, ROWS, smooth_rows, w);
+    else
+        (void)run_rows(w, smooth_rows, w->velocity, true);
 }
 
 /* Momenta become what all sweeps make of them. */
@@ -270,9 +269,8 @@ ascc_status ascc_smooth_velocities(const ascc_smoothing *s)
     ascc_status status = find_heaviest(s, &w.heaviest);
     if (status != ASCC_OK || sweeps == 0)
         return status;
-    ascc_workers_run(s->state->tools.workers, s->count, 4 * ROWS, velocity_rows, &w);
-    status = refresh(&w, w.velocity);
-    for (int32_t k = 0; k < sweeps && status == ASCC_OK; k++)
-        status = smooth(&w, k);
+    status = run_rows(&w, velocity_rows, w.velocity, false);
+    for (; w.k < sweeps && status == ASCC_OK; w.k++)
+        smooth(&w);
     return status == ASCC_OK ? give(&w) : status;
 }

@@ -16,6 +16,7 @@
 
 #include "active_rows.h"
 #include "hyperviscosity.h"
+#include "network/early_rows.h"
 #include "relaxation_pairs.h"
 
 #define ROWS 256       /* of a block of work */
@@ -520,17 +521,15 @@ static void trace_sweep(const relaxation *r, int32_t k)
     memcpy(t->push + 4 * (at - n), r->move, 4 * n * sizeof *t->push);
 }
 
-/* What pairs read of ghosts. */
-static ascc_status refresh_pressure(const relaxation *r)
+/* What pairs read of ghosts. sure: nothing can have failed since the last time. */
+static ascc_halo_refresh fresh_pressure(const relaxation *r, bool sure)
 {
-    const ascc_halo_rows rows = {r->pressure, sizeof *r->pressure};
-    return ascc_hierarchy_refresh(&r->state->hierarchy, ASCC_SET_FLUID, &rows, 1);
+    return (ascc_halo_refresh){ASCC_SET_FLUID, sure, 1, {{r->pressure, sizeof *r->pressure}}};
 }
 
-static ascc_status refresh_move(const relaxation *r)
+static ascc_halo_refresh fresh_move(const relaxation *r, bool sure)
 {
-    const ascc_halo_rows rows = {r->move, 4 * sizeof *r->move};
-    return ascc_hierarchy_refresh(&r->state->hierarchy, ASCC_SET_FLUID, &rows, 1);
+    return (ascc_halo_refresh){ASCC_SET_FLUID, sure, 1, {{r->move, 4 * sizeof *r->move}}};
 }
 
 /* Everything that sweeps read. slows: of velocities. */
@@ -571,7 +570,8 @@ static ascc_status open_relaxation(relaxation *r, ascc_step_state *state, bool s
                          " (row %zu): the network takes it too far to relax",
                          state->particles->id[row], row);
     }
-    status = slows ? refresh_move(r) : ASCC_OK;
+    const ascc_halo_refresh move = fresh_move(r, false);
+    status = slows ? ascc_hierarchy_refresh(&state->hierarchy, &move) : ASCC_OK;
     if (status != ASCC_OK)
         return status;
     return !find_pairs(r) || (r->trace && !begin_trace(r)) ? no_memory(state) : ASCC_OK;
@@ -714,13 +714,14 @@ static void look_for_moved(relaxation *r, const ascc_gradients *pairs)
 
 static ascc_status sweep(relaxation *r, const ascc_sweeps *sweeps)
 {
-    ascc_workers *workers = r->state->tools.workers;
     const ascc_gradients pairs = gradients(r);
+    const ascc_hierarchy *h = &r->state->hierarchy;
+    const ascc_search_tools *tools = &r->state->tools;
+    const ascc_halo_refresh first = fresh_pressure(r, false), move = fresh_move(r, true),
+                            pressure = fresh_pressure(r, true);
     ascc_status status = ASCC_OK;
-    if (r->guess) {
-        ascc_workers_run(workers, r->count, 16 * ROWS, guess_rows, r);
-        status = refresh_pressure(r);
-    }
+    if (r->guess)
+        status = ascc_early_rows_run(h, tools, 16 * ROWS, guess_rows, r, &first);
     if (r->trace) {
         r->trace->guessed = r->guess != NULL;
         trace_sweep(r, -1);
@@ -728,19 +729,15 @@ static ascc_status sweep(relaxation *r, const ascc_sweeps *sweeps)
     for (int32_t k = 0; k < sweeps->count && status == ASCC_OK; k++) {
         begin_sweep(r, k);
         if (k > 0 || r->guess) {
-            ascc_workers_run(workers, r->count, ROWS, push_rows, r);
-            status = refresh_move(r);
-            if (status != ASCC_OK)
-                return status;
+            (void)ascc_early_rows_run(h, tools, ROWS, push_rows, r, &move);
             look_for_moved(r, &pairs);
-            ascc_workers_run(workers, r->count, ROWS, relax_rows, r);
+            (void)ascc_early_rows_run(h, tools, ROWS, relax_rows, r, &pressure);
         } else {
-            ascc_workers_run(workers, r->count, 16 * ROWS, begin_rows, r);
+            status = ascc_early_rows_run(h, tools, 16 * ROWS, begin_rows, r, &first);
         }
         look_for_active(r, &pairs);
         if (r->trace)
             trace_sweep(r, k);
-        status = refresh_pressure(r);
     }
     return status;
 }
