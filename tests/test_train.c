@@ -5,6 +5,7 @@
 #include <unistd.h>
 
 #include "model/model.h"
+#include "model/relaxation.h"
 #include "support/float_modes.h"
 #include "support/model_builder.h"
 #include "support/oracle.h"
@@ -145,6 +146,7 @@ typedef struct gradient_case {
     int warm_up, unroll;
     int constant_positions;
     int samples; /* of each tensor; 0 = 12 */
+    uint32_t learn;
 } gradient_case;
 
 typedef struct bench {
@@ -245,6 +247,53 @@ static double check_tensor(bench *b, const oracle_tensor *tensor, const float *g
     return worst;
 }
 
+/* Constants of the relaxation, one of which is the parameter: value at which it is, gradient there. */
+static double slope_of_constant(bench *b, double *value, double step)
+{
+    const oracle_mode mode = b->c->constant_positions ? ORACLE_POSITIONS : ORACLE_LATTICES;
+    const int32_t d = b->model->plan.dimension;
+    const double was = *value;
+    double loss[2];
+    for (int k = 0; k < 2; k++) {
+        *value = was * (1.0 + (k ? step : -step));
+        ascc_relaxation_derive(&b->model->plan.relaxation, d);
+        loss[k] = loss_of(b, mode);
+    }
+    *value = was;
+    ascc_relaxation_derive(&b->model->plan.relaxation, d);
+    return (loss[1] - loss[0]) / (2.0 * step);
+}
+
+/* All that are learned, relative to the largest: each is by the logarithm of its value. */
+static double check_constants(bench *b, const float *gradient)
+{
+    ascc_relaxation *r = &b->model->plan.relaxation;
+    double *const value[] = {&r->rest_volume, &r->epsilon, r->pressure.omega, r->divergence.omega};
+    const int32_t count[] = {1, 1, r->pressure.count, r->divergence.count};
+    double worst = 0.0, largest = 0.0;
+    size_t all = 0;
+    for (int k = 0; k < 4; k++)
+        all += b->c->learn >> k & 1 ? (size_t)count[k] : 0;
+    for (size_t i = 0; i < all; i++)
+        largest = fmax(largest, fabs((double)gradient[i]));
+    for (int k = 0; k < 4; k++) {
+        for (int32_t i = 0; b->c->learn >> k & 1 && i < count[k]; i++, gradient++) {
+            double best = INFINITY, slope = 0.0;
+            for (double step = 1e-5; step > 5e-9 && !(best < 0.1 * GRADIENT_BOUND); step *= 0.1) {
+                slope = slope_of_constant(b, &value[k][i], step);
+                best = fmin(best, slope == (double)*gradient ? 0.0
+                                                             : fabs(slope - (double)*gradient) /
+                                                                   fmax(largest, fabs(slope)));
+            }
+            if (!(best < GRADIENT_BOUND))
+                print_error("%s: constant %d, %d: %.9g, not %.9g\n", b->c->name, k, (int)i,
+                            (double)*gradient, slope);
+            worst = fmax(worst, best);
+        }
+    }
+    return worst;
+}
+
 static double check_gradient(const gradient_case *c)
 {
     bench b;
@@ -255,6 +304,7 @@ static double check_gradient(const gradient_case *c)
     options.density_weight = c->loss.density_weight;
     options.wall_weight = c->loss.wall_weight;
     options.velocity_weight = c->loss.velocity_weight;
+    options.learn = c->learn;
     ascc_trainer *trainer = open_trainer(&options, &c->random, b.m);
     const size_t count = ascc_trainer_parameter_count(trainer);
     float *gradient = calloc(count + 1, sizeof *gradient), *values = parameters_of(trainer);
@@ -277,7 +327,9 @@ static double check_gradient(const gradient_case *c)
             assert_true((double)values[at + i] == b.weight[list[t].offset + i]);
         worst = fmax(worst, check_tensor(&b, &list[t], gradient + at));
     }
-    assert_int_equal(at, count);
+    worst = fmax(worst, check_constants(&b, gradient + at));
+    assert_true(c->learn ? at < count : at == count);
+    assert_true(!c->learn || values[at] == 0.0f);
     assert_true(2 * (size_t)b.dead < tensors);
     if (!(worst < GRADIENT_BOUND))
         fail_msg("%s: a gradient is off by %.3g of its tensor's largest", c->name, worst);
@@ -463,6 +515,7 @@ static void gradients_through_the_relaxation_are_right(void **state)
                            .samples = 10};
         c.random.relaxation = text;
         c.random.guess = v > 4;
+        c.learn = v % 4 ? 15 : 7;
         worst = fmax(worst, check_gradient(&c));
     }
     print_message("# relaxation: %.2g\n", worst);
@@ -1078,6 +1131,79 @@ static void a_relaxation_is_trained_with_and_kept(void **state)
     free(m);
 }
 
+/* Constants that a model may not have are refused, those that training comes to are taken by a reader, and a state
+ * holds them. */
+static void constants_of_a_relaxation_are_learned_within_what_a_model_may_have(void **state)
+{
+    (void)state;
+    model_random random = everything(31, 2);
+    char text[320];
+    (void)snprintf(text, sizeof text,
+                   "{\"support\":%s,\"rest_volume\":%s,\"omega\":[0.5,0.5,0.5],"
+                   "\"epsilon\":0.1,\"limit\":%s,\"divergence\":[0.5,0.5]}",
+                   model_number(2.0 * SPACING), model_number(0.8 * SPACING * SPACING),
+                   model_number(0.2 * SPACING));
+    random.relaxation = text;
+    ascc_trainer_options options = augmented();
+    static const ascc_training_stage fast = {.end = 1000, .unroll = 1, .learning_rate = 0.05};
+    motion *m = make_motion(10, 2);
+    options.stage = &fast;
+    options.stage_count = 1;
+    options.learn = 15;
+    options.velocity_weight = 1.0; /* divergence changes velocities alone */
+    ascc_trainer *a = open_trainer(&options, &random, m);
+    ascc_trainer *b = open_threaded(2, &options, &random, m);
+    const size_t count = ascc_trainer_parameter_count(a), first = count - 7;
+    float *values = parameters_of(a);
+    values[first] = 0.1f;
+    assert_int_equal(ascc_trainer_set_parameters(a, values), ASCC_OK);
+    values[first + 2] = 0.5f; /* sweeps of 0.75, 0.5, 0.5 do not settle */
+    assert_int_equal(ascc_trainer_set_parameters(a, values), ASCC_ERROR_ARGUMENT);
+    values[first + 2] = (float)NAN;
+    assert_int_equal(ascc_trainer_set_parameters(a, values), ASCC_ERROR_ARGUMENT);
+    values[first + 2] = values[first] = 0.0f;
+    assert_int_equal(ascc_trainer_set_parameters(a, values), ASCC_OK);
+    iterate(a, 20);
+    iterate(b, 20);
+    assert_same_models(a, b);
+    size_t size;
+    const void *bytes = ascc_trainer_model(a, 0, &size);
+    ascc_context *context = NULL;
+    ascc_model *model = NULL;
+    assert_int_equal(ascc_context_create(NULL, &context), ASCC_OK);
+    assert_int_equal(ascc_model_load_memory(context, bytes, size, &model), ASCC_OK);
+    const ascc_relaxation *r = &model->plan.relaxation;
+    free(values);
+    values = parameters_of(a);
+    assert_true(r->rest_volume == 0.8 * SPACING * SPACING * (1.0 + (double)values[first]));
+    assert_true(r->epsilon == 0.1 * (1.0 + (double)values[first + 1]));
+    for (size_t i = 0; i < 3; i++)
+        assert_true(r->pressure.omega[i] == 0.5 * (1.0 + (double)values[first + 2 + i]));
+    for (size_t i = 0; i < 2; i++)
+        assert_true(r->divergence.omega[i] == 0.5 * (1.0 + (double)values[first + 5 + i]));
+    for (size_t i = first; i < count; i++)
+        assert_true(values[i] != 0.0f);
+    ascc_model_destroy(&model);
+    ascc_context_destroy(&context);
+
+    char path[] = "/tmp/ascc-learned-XXXXXX";
+    const int file = mkstemp(path);
+    assert_true(file >= 0);
+    (void)close(file);
+    assert_int_equal(ascc_trainer_save(a, path), ASCC_OK);
+    ascc_trainer *c = open_trainer(&options, &random, m);
+    assert_int_equal(ascc_trainer_load(c, path), ASCC_OK);
+    iterate(a, 2);
+    iterate(c, 2);
+    assert_same_models(a, c);
+    (void)unlink(path);
+    free(values);
+    ascc_trainer_destroy(&a);
+    ascc_trainer_destroy(&b);
+    ascc_trainer_destroy(&c);
+    free(m);
+}
+
 /* Cuts the network off from every channel that is a vector's: it sees distances alone. */
 static void blind(ascc_trainer *trainer, size_t d)
 {
@@ -1211,6 +1337,7 @@ int main(void)
         cmocka_unit_test(the_share_of_true_states_takes_no_steps_before),
         cmocka_unit_test(training_lowers_the_loss),
         cmocka_unit_test(a_relaxation_is_trained_with_and_kept),
+        cmocka_unit_test(constants_of_a_relaxation_are_learned_within_what_a_model_may_have),
         cmocka_unit_test(augmentation_turns_the_whole_world),
         cmocka_unit_test(the_model_that_comes_out_has_the_weights),
     };

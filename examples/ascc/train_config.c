@@ -345,6 +345,40 @@ static void read_stages(reading *g, json_t *root, ascc_train_config *c)
     c->options.stage_count = count;
 }
 
+/* Constants of the relaxation that are trained, by their names in model files. */
+static uint32_t read_learned(reading *g, json_t *root)
+{
+    static const struct {
+        const char *name;
+        uint32_t bit;
+    } constants[] = {{"rest_volume", ASCC_LEARN_REST_VOLUME},
+                     {"epsilon", ASCC_LEARN_EPSILON},
+                     {"omega", ASCC_LEARN_OMEGA},
+                     {"divergence", ASCC_LEARN_DIVERGENCE}};
+    ascc_members *r = &g->r;
+    uint32_t learn = 0;
+    if (!has(r, root, "relaxation"))
+        return 0;
+    json_t *o = ascc_members_object(r, root, "relaxation");
+    ascc_members_where(r, "relaxation");
+    const json_t *array = ascc_members_array(r, o, "learn");
+    size_t i;
+    json_t *value;
+    json_array_foreach(array, i, value)
+    {
+        uint32_t bit = 0;
+        for (size_t k = 0; k < sizeof constants / sizeof *constants; k++)
+            if (json_is_string(value) && strcmp(json_string_value(value), constants[k].name) == 0)
+                bit = constants[k].bit;
+        if (!bit)
+            ascc_members_fail(r, "'learn' lists 'rest_volume', 'epsilon', 'omega', 'divergence'");
+        learn |= bit;
+    }
+    ascc_members_end(r, o);
+    ascc_members_where(r, "config");
+    return learn;
+}
+
 static void read_options(reading *g, json_t *root, ascc_trainer_options *o)
 {
     ascc_members *r = &g->r;
@@ -365,6 +399,7 @@ static void read_options(reading *g, json_t *root, ascc_trainer_options *o)
     o->whiten = flag_or(r, root, "whiten", true) ? 0 : -1;
     o->relaxation_gradients = flag_or(r, root, "relaxation_gradients", true) ? 0 : -1;
     o->position_gradients = flag_or(r, root, "position_gradients", false);
+    o->learn = read_learned(g, root);
     const double gib = number_or(r, root, "memory", 1e-3, 1e6, 0.0);
     o->memory_limit = (size_t)(gib * 1024.0 * 1024.0 * 1024.0);
 }

@@ -87,6 +87,14 @@ typedef struct ascc_training_stage {
     double learning_rate_end; /* at its end, on a geometric path; 0 = as at its beginning */
 } ascc_training_stage;
 
+/** Constants of a model's relaxation that can be trained beside its weights. */
+typedef enum ascc_learn {
+    ASCC_LEARN_REST_VOLUME = 1,
+    ASCC_LEARN_EPSILON = 2,
+    ASCC_LEARN_OMEGA = 4,     /* of each pressure sweep */
+    ASCC_LEARN_DIVERGENCE = 8 /* of each divergence sweep */
+} ascc_learn;
+
 /** Options of ascc_trainer_create. Zero means the default that is stated. */
 typedef struct ascc_trainer_options {
     size_t size;                      /* sizeof(ascc_trainer_options) */
@@ -116,6 +124,9 @@ typedef struct ascc_trainer_options {
     int32_t
         relaxation_gradients; /* through the relaxation: 0 = exact, -1 = as if there were none */
     double velocity_weight; /* of velocities that are not the truth's, docs/training.md; 0 = none */
+    uint32_t
+        learn; /* constants of the relaxation that are trained, a sum of ascc_learn; 0 = none */
+    uint32_t reserved;
 } ascc_trainer_options;
 
 /** What an iteration did. */

@@ -7,14 +7,9 @@
 /* Neighbour lists of a relaxation reach this far beyond its support, in spacings: they are made where
  * the network sees the particles, and it moves them. */
 #define MARGIN 0.25
-/* Supports in units of the distance at which a lattice of resting particles has them. */
-#define SMALLEST_SUPPORT 1.5
-#define LARGEST_SUPPORT 4.0
 /* Above the largest eigenvalue of a sweep, D^-1 B B^T: 3.2 on a cubic lattice at rest, 2.4 on a square
  * one, more where it is compressed. */
 #define LARGEST_EIGENVALUE 4.0
-/* Of a sweep: a deep column at rest blew up with Chebyshev's weights that began with 4. */
-#define LARGEST_OMEGA 2.0
 
 /* The positive root of x^d = v by Newton, in any build the same. */
 static double root(double v, int32_t d)
@@ -42,18 +37,33 @@ static double lattice_response(double amount, double apart, int32_t d)
     return sum;
 }
 
+static double support_volume(const ascc_relaxation *r, int32_t d)
+{
+    return d == 2 ? r->support * r->support : r->support * r->support * r->support;
+}
+
+/* How far particles at rest are apart, in supports. */
+static double distance_at_rest(const ascc_relaxation *r, int32_t d)
+{
+    return root(r->rest_volume / support_volume(r, d), d);
+}
+
 /* Volumes are counted in what the spline sums to. */
-static void find_constants(ascc_reader *reader, const ascc_plan *plan, ascc_relaxation *r)
+void ascc_relaxation_derive(ascc_relaxation *r, int32_t d)
 {
     static const double pi = 3.14159265358979323846;
-    const int32_t d = plan->dimension;
-    const double support = d == 2 ? r->support * r->support : r->support * r->support * r->support;
-    const double apart = root(r->rest_volume / support, d);
-    if (!(SMALLEST_SUPPORT * apart <= 1.0 && LARGEST_SUPPORT * apart >= 1.0)) {
+    r->amount = (d == 2 ? 40.0 / (7.0 * pi) : 8.0 / pi) * r->rest_volume / support_volume(r, d);
+    r->lattice_response = lattice_response(r->amount, distance_at_rest(r, d), d);
+}
+
+static void find_constants(ascc_reader *reader, const ascc_plan *plan, ascc_relaxation *r)
+{
+    const double apart = distance_at_rest(r, plan->dimension);
+    if (!(ASCC_SMALLEST_SUPPORT * apart <= 1.0 && ASCC_LARGEST_SUPPORT * apart >= 1.0)) {
         ascc_reader_fail(reader,
                          "'support' must be %g to %g times the distance of particles at rest, "
                          "%g m by 'rest_volume'",
-                         SMALLEST_SUPPORT, LARGEST_SUPPORT, apart * r->support);
+                         ASCC_SMALLEST_SUPPORT, ASCC_LARGEST_SUPPORT, apart * r->support);
         return;
     }
     if (!(apart * r->support >= 0.5 * plan->spacing && apart * r->support <= 2.0 * plan->spacing)) {
@@ -63,13 +73,12 @@ static void find_constants(ascc_reader *reader, const ascc_plan *plan, ascc_rela
                          apart * r->support);
         return;
     }
-    r->amount = (d == 2 ? 40.0 / (7.0 * pi) : 8.0 / pi) * r->rest_volume / support;
-    r->lattice_response = lattice_response(r->amount, apart, d);
+    ascc_relaxation_derive(r, plan->dimension);
     r->reach = r->support + MARGIN * plan->spacing;
 }
 
 /* What sweeps leave of an excess is the product of their 1 - omega lambda, for every eigenvalue lambda. */
-static bool settles(const ascc_sweeps *sweeps)
+bool ascc_sweeps_settle(const ascc_sweeps *sweeps)
 {
     enum { STEPS = 400 };
     for (int i = 0; i <= STEPS; i++) {
@@ -104,9 +113,10 @@ static void read_sweeps(ascc_reader *reader, uint32_t object, const char *key, a
     const int32_t count = count_sweeps(reader, object, key);
     if (count == 0)
         return;
-    ascc_reader_numbers(reader, object, key, count, 1e-3, LARGEST_OMEGA, sweeps->omega);
+    ascc_reader_numbers(reader, object, key, count, ASCC_SMALLEST_OMEGA, ASCC_LARGEST_OMEGA,
+                        sweeps->omega);
     sweeps->count = count;
-    if (reader->status == ASCC_OK && !settles(sweeps))
+    if (reader->status == ASCC_OK && !ascc_sweeps_settle(sweeps))
         ascc_reader_fail(reader,
                          "sweeps of these numbers '%s' would not settle; if all are the same, 0.5 "
                          "is the most",
@@ -166,7 +176,8 @@ void ascc_relaxation_read(ascc_reader *reader, uint32_t object, ascc_plan_builde
     r.support = ascc_reader_number(reader, o, "support", ASCC_PLAN_MIN, ASCC_PLAN_MAX);
     r.rest_volume = ascc_reader_number(reader, o, "rest_volume", 1e-45, 1e45);
     read_sweeps(reader, o, "omega", &r.pressure);
-    r.epsilon = ascc_reader_number(reader, o, "epsilon", 1e-3, 10.0);
+    r.epsilon =
+        ascc_reader_number(reader, o, "epsilon", ASCC_SMALLEST_EPSILON, ASCC_LARGEST_EPSILON);
     r.limit = ascc_reader_number(reader, o, "limit", 1e-6 * r.support, r.support);
     if (ascc_reader_has(reader, o, "divergence"))
         read_sweeps(reader, o, "divergence", &r.divergence);

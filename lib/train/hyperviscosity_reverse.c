@@ -92,7 +92,7 @@ static void sweep_back(const reverse *r, int32_t k, float *by)
 
 /* A pair's weight is its square times the smaller coefficient, and a coefficient 1 over the sum of its row's squares,
  * if that is not cut. */
-static void coefficients_back(const reverse *r, float *by_squares)
+static void coefficients_back(const reverse *r, float *by_squares, double *by_lattice)
 {
     const ascc_gradients *pairs = &r->trace->pairs;
     const float *own = r->trace->coefficient;
@@ -107,8 +107,11 @@ static void coefficients_back(const reverse *r, float *by_squares)
             float square = 0.0f;
             for (int c = 0; c < 3; c++)
                 square += pairs->g[c][k] * pairs->g[c][k];
+            const float by = r->by_square[at] * square * own[smaller] * own[smaller];
             if (own[smaller] < least)
-                by_squares[smaller] -= r->by_square[at] * square * own[smaller] * own[smaller];
+                by_squares[smaller] -= by;
+            else
+                *by_lattice -= (double)by;
             r->by_square[at++] *= own[smaller];
         }
 }
@@ -137,6 +140,6 @@ ascc_status ascc_smoothing_backward(const ascc_step_state *state, ascc_arena *ar
     memset(r.by_square, 0, ascc_smoothing_pairs(trace, count) * sizeof *r.by_square);
     for (int32_t k = ascc_smoothing_sweeps(state); k > 0; k--)
         sweep_back(&r, k - 1, gradients->velocity);
-    coefficients_back(&r, gradients->by_squares);
+    coefficients_back(&r, gradients->by_squares, gradients->by_lattice);
     return ASCC_OK;
 }

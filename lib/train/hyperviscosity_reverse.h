@@ -11,6 +11,7 @@ typedef struct ascc_smoothing_gradients {
     float *by_squares; /* [row] = of their sum over a row's pairs */
     float
         *by_square; /* [pair] = of each pair, those of a row with neighbours after it, row by row */
+    double *by_lattice; /* += of the lattice's response, where that cuts coefficients */
 } ascc_smoothing_gradients;
 
 /* How many pairs that are. */

@@ -15,6 +15,7 @@
 #include <string.h>
 
 #include "hyperviscosity_reverse.h"
+#include "model/relaxation.h"
 
 /* What a sweep leaves with a row: (c_i + c_j) times the difference of moves, and likewise of pushes. */
 typedef struct side {
@@ -57,6 +58,8 @@ typedef struct reverse {
     float *by;         /* of the corrections */
     float *by_place;   /* [row][3] */
     double *by_before; /* [row][3] likewise of `before` */
+    /* Of what scales with the rest volume, by its logarithm; of the lattice's response; of epsilon and the sweeps: */
+    double *by_volume, *by_lattice, *by_epsilon, *by_omega;
 } reverse;
 
 static float dot(const float a[3], const float b[3])
@@ -88,6 +91,12 @@ static void find_spline(batch *b)
         b->slope[k] = -6.0f * (far * far - 4.0f * near * near);
         b->curvature[k] = 12.0f * (far - 4.0f * near);
     }
+}
+
+static float spline_of(float q)
+{
+    const float far = 1.0f - q, near = q < 0.5f ? 0.5f - q : 0.0f;
+    return 2.0f * far * far * far - 8.0f * near * near * near;
 }
 
 /* The pairs of row i whose neighbours come after it, from *at on; false if there are none left. */
@@ -215,6 +224,7 @@ static void mend_pair(const reverse *r, size_t i, const batch *b, size_t k, floa
     for (int c = 0; c < 3; c++)
         rest[c] = by[c] - one[c];
     const float by_pressure = -b->slope[k] * dot(u, rest);
+    *r->by_volume += (double)(pressure * by_pressure);
     r->by_pressure[i] += by_pressure;
     r->by_pressure[j] += by_pressure;
     bend(u, -b->curvature[k] * pressure, -b->slope[k] / q * pressure, rest, back);
@@ -248,6 +258,10 @@ static void mend_walls(const reverse *r, size_t i, float pressure)
                 one[c] = r->by[i * 4 + c];
             }
             unlimit(correction, limit, one);
+            if (dot(correction, correction) >
+                limit * limit) /* walls' share goes with 1 over the volume */
+                *r->by_volume -= (double)(limit / sqrtf(dot(correction, correction)) *
+                                          dot(r->by + i * 4, correction));
             for (size_t c = 0; c < 3; c++)
                 rest[c] = r->by[i * 4 + c] - one[c];
             r->by_pressure[i] -= b.slope[k] * dot(u, rest);
@@ -309,7 +323,9 @@ static void sweep_back(reverse *r, int32_t s)
     for (size_t i = 0; i < r->count; i++) {
         r->by_pressure[i] = next[i] > 0.0f ? r->by_pressure[i] : 0.0f;
         const float by = omega * r->by_pressure[i];
-        r->by_response[i] += by * (t->excess[i] + (moved ? change[i] : 0.0f));
+        const float left = t->excess[i] + (moved ? change[i] : 0.0f);
+        r->by_omega[s] += (double)(r->by_pressure[i] * left * t->response[i]);
+        r->by_response[i] += by * left;
         r->by_change[i] = by * t->response[i];
         r->by_excess[i] += r->by_change[i];
     }
@@ -340,6 +356,7 @@ static void sweeps_back(reverse *r)
 static void fill_heads(const reverse *r, bool densities)
 {
     const ascc_relaxation_trace *t = r->trace;
+    double by_softening = 0.0;
     for (size_t i = 0; i < r->count; i++) {
         head *to = &r->head[i];
         to->twice = -2.0f * r->by_response[i] * t->response[i] * t->response[i];
@@ -347,7 +364,11 @@ static void fill_heads(const reverse *r, bool densities)
             to->response[c] = to->twice * t->own[c][i];
         to->twice += r->by_squares ? 2.0f * r->by_squares[i] : 0.0f;
         to->density = densities ? r->by_excess[i] : 0.0f;
+        *r->by_volume += (double)(to->density * r->amount); /* of itself */
+        by_softening -= (double)(r->by_response[i] * t->response[i] * t->response[i]);
     }
+    *r->by_epsilon += by_softening * r->constants->lattice_response;
+    *r->by_lattice += by_softening * r->constants->epsilon;
 }
 
 /* Adds what a pair's gradient has from all sweeps, both sides together. */
@@ -379,9 +400,11 @@ static void pass_pairs(const reverse *r, size_t i, batch *b, size_t *pair)
                 by[c] = here->response[c] - there->response[c];
             add_sides(own, r->side + j * r->sides, r->used, by);
             bend(u, -b->curvature[k], -b->slope[k] / b->distance[k], by, by_difference);
-            const float radial =
-                b->slope[k] * (b->curvature[k] * (here->twice + there->twice + own_square) +
-                               (here->density + there->density));
+            const float twice = here->twice + there->twice + own_square;
+            const float density = here->density + there->density;
+            const float radial = b->slope[k] * (b->curvature[k] * twice + density);
+            *r->by_volume += (double)(b->slope[k] * (twice * b->slope[k] - dot(by, u)) +
+                                      density * r->amount * spline_of(b->distance[k]));
             for (int c = 0; c < 3; c++)
                 by_difference[c] += radial * u[c];
             add_places(r, i, j, by_difference);
@@ -497,8 +520,32 @@ static bool find_lines(reverse *r, const double *before)
 static void guess_back(const reverse *r, double *by_guess)
 {
     const double unit = ascc_step_share(r->state) / r->constants->lattice_response;
-    for (size_t i = 0; i < r->count; i++)
+    for (size_t i = 0; i < r->count; i++) {
         by_guess[host_row(r, i)] = unit * (double)r->by_pressure[i];
+        *r->by_lattice -=
+            (double)(r->by_pressure[i] * r->trace->pressure[i]) / r->constants->lattice_response;
+    }
+}
+
+static void find_constants(reverse *r, ascc_constant_gradients *by, double *by_omega,
+                           double *by_lattice)
+{
+    r->by_volume = &by->volume;
+    r->by_epsilon = &by->epsilon;
+    r->by_omega = by_omega;
+    r->by_lattice = by_lattice;
+}
+
+/* How the lattice's response goes with the logarithm of the rest volume, by a difference. */
+static double lattice_by_volume(const reverse *r)
+{
+    const double step = 1e-4;
+    ascc_relaxation more = *r->constants, less = *r->constants;
+    more.rest_volume *= 1.0 + step;
+    less.rest_volume *= 1.0 - step;
+    ascc_relaxation_derive(&more, (int32_t)r->d);
+    ascc_relaxation_derive(&less, (int32_t)r->d);
+    return (more.lattice_response - less.lattice_response) / (2.0 * step);
 }
 
 /* x' = x + d, v' = v + d / dt. */
@@ -512,6 +559,8 @@ static ascc_status pressure_back(const ascc_step_state *state, ascc_arena *arena
         !find_lines(&r, gradients->before))
         return ASCC_ERROR_MEMORY;
     r.repulsion = (float)(r.constants->repulsion / r.constants->support);
+    double by_lattice = 0.0;
+    find_constants(&r, gradients->by_constants, gradients->by_constants->pressure, &by_lattice);
     gather_by(&r, gradients->velocity, gradients->position);
     apply_back(&r);
     sweeps_back(&r);
@@ -522,6 +571,7 @@ static ascc_status pressure_back(const ascc_step_state *state, ascc_arena *arena
     for (size_t i = 0; r.by_before && i < r.count; i++)
         for (size_t c = 0; c < r.d; c++)
             gradients->by_before[host_row(&r, i) * r.d + c] += r.by_before[i * 3 + c] * r.unit;
+    *r.by_volume += by_lattice * lattice_by_volume(&r);
     return ASCC_OK;
 }
 
@@ -531,6 +581,7 @@ static ascc_status smoothing_back(reverse *r, double *velocity)
     const size_t pairs = ascc_smoothing_pairs(r->trace, r->count);
     const ascc_smoothing_gradients gradients = {
         .velocity = r->by,
+        .by_lattice = r->by_lattice,
         .by_squares = zeros(r, 1),
         .by_square = ascc_arena_take(r->arena, pairs, sizeof *gradients.by_square)};
     if (!gradients.by_squares || !gradients.by_square)
@@ -554,6 +605,8 @@ static ascc_status divergence_back(const ascc_step_state *state, ascc_arena *are
     if (!open_reverse(&r, state, arena, &state->network->plan->relaxation.divergence, trace,
                       state->relaxed.round[state->relaxed.rounds - 1].rows[1]))
         return ASCC_ERROR_MEMORY;
+    double by_lattice = 0.0;
+    find_constants(&r, gradients->by_constants, gradients->by_constants->divergence, &by_lattice);
     gather_by(&r, gradients->velocity, NULL);
     if (trace->coefficient && smoothing_back(&r, gradients->velocity) != ASCC_OK)
         return ASCC_ERROR_MEMORY;
@@ -568,6 +621,7 @@ static ascc_status divergence_back(const ascc_step_state *state, ascc_arena *are
     scatter(&r, r.by_place, 3, r.unit, gradients->position);
     state->tools.kernels->push(&trace->pairs, 0, r.count, r.by_excess, trace->own, r.by_push);
     scatter(&r, r.by_push, 4, -state->motion->time_step * r.unit, gradients->velocity);
+    *r.by_volume += by_lattice * lattice_by_volume(&r);
     return ASCC_OK;
 }
 

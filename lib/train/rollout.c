@@ -5,8 +5,6 @@
 #include <math.h>
 #include <string.h>
 
-#include "relaxation_reverse.h"
-
 /* Steps without gradient have blown up where particles are this far off on average, spacings. */
 #define BLOWN_UP 2.0
 
@@ -341,7 +339,8 @@ static void settle_past(rollout *r)
 }
 
 /* Gradients after a step become those before it. */
-static ascc_status step_back(rollout *r, size_t t, const ascc_step_state *state, float *packed)
+static ascc_status step_back(rollout *r, size_t t, const ascc_step_state *state, float *packed,
+                             ascc_constant_gradients *by_constants)
 {
     ascc_rollout_worker *w = r->worker;
     const size_t n = r->numbers;
@@ -351,7 +350,8 @@ static ascc_status step_back(rollout *r, size_t t, const ascc_step_state *state,
                                                .position = r->by_position,
                                                .velocity = r->by_velocity,
                                                .by_guess = r->by_guess,
-                                               .by_before = r->place};
+                                               .by_before = r->place,
+                                               .by_constants = by_constants};
     if (r->task->relaxation_gradients &&
         ascc_relaxation_backward(state, &w->scratch, &relaxed) != ASCC_OK)
         return ASCC_ERROR_MEMORY;
@@ -431,7 +431,8 @@ static void go_back(rollout *r, ascc_rollout_result *result, size_t kept_from, f
             result->status = step_into(r, r->first_frame, 0);
         }
         if (result->status == ASCC_OK)
-            result->status = step_back(r, t - 1, &r->worker->state[arena], packed);
+            result->status =
+                step_back(r, t - 1, &r->worker->state[arena], packed, &result->constants);
     }
     if (result->status == ASCC_OK)
         ascc_packed_fold(&model->packed, &model->plan, model->weights, packed, gradient);

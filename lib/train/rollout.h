@@ -6,6 +6,7 @@
 #include "network/reverse.h"
 #include "step/step.h"
 #include "data.h"
+#include "relaxation_reverse.h"
 
 /* What a rollout asks for. */
 typedef struct ascc_rollout_task {
@@ -23,6 +24,7 @@ typedef struct ascc_rollout_task {
 
 /* What became of it. */
 typedef struct ascc_rollout_result {
+    ascc_constant_gradients constants; /* of the relaxation */
     double loss;
     int32_t steps;    /* computed forwards, again for the way back not counted */
     bool ended_early; /* steps without gradient blew up: the rest began at the true state */

@@ -24,6 +24,7 @@ static void fill_model(const ascc_trainer *t, const float *weights, unsigned cha
     for (size_t i = 0; i < t->tensor_count; i++)
         memcpy(bytes + (t->file.tensor[i].data - t->bytes), weights + t->tensor[i].first,
                t->tensor[i].count * sizeof(float));
+    ascc_learned_write(&t->learned, weights + t->learned.first, bytes);
 }
 
 const void *ascc_trainer_model(ascc_trainer *t, int32_t averaged, size_t *size)
@@ -38,12 +39,12 @@ const void *ascc_trainer_model(ascc_trainer *t, int32_t averaged, size_t *size)
     return bytes;
 }
 
-/* Of the network, whatever its weights: FNV-1a of the file's header. */
+/* Of the network, whatever its weights and what it learns besides: FNV-1a of the file's header. */
 static uint64_t network_hash(const ascc_trainer *t)
 {
     uint64_t hash = 0xcbf29ce484222325u;
     for (size_t i = 0; i < t->header_count; i++)
-        hash = (hash ^ t->bytes[i]) * 0x100000001b3u;
+        hash = (hash ^ (ascc_learned_covers(&t->learned, i) ? ' ' : t->bytes[i])) * 0x100000001b3u;
     return hash;
 }
 
@@ -169,6 +170,8 @@ static ascc_status read_arrays(ascc_trainer *t, const char *path, const ascc_saf
         if (state[MOMENT2 * n + i] < 0.0f)
             status = FAIL(ASCC_ERROR_FORMAT, "'%s': tensor '%s': value %zu is negative", path,
                           names[MOMENT2], i);
+    if (status == ASCC_OK && !ascc_learned_takes(&t->learned, state + t->learned.first))
+        status = FAIL(ASCC_ERROR_FORMAT, "'%s': constants that no model may have", path);
     for (size_t i = 0; i < MOMENT1 && status == ASCC_OK; i++)
         status = check_weights(t, path, names[i], state + i * n);
     return status;

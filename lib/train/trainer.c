@@ -93,6 +93,9 @@ static ascc_status read_options(ascc_trainer *t, const ascc_trainer_options *giv
         return REFUSE(ASCC_ERROR_ARGUMENT, "options: whiten is 0 or -1");
     if (o->relaxation_gradients < -1 || o->relaxation_gradients > 0)
         return REFUSE(ASCC_ERROR_ARGUMENT, "options: relaxation_gradients is 0 or -1");
+    if (o->learn > 15 || o->reserved || (o->learn && o->relaxation_gradients))
+        return REFUSE(ASCC_ERROR_ARGUMENT,
+                      "options: learn is a sum of ascc_learn, and needs relaxation_gradients 0");
     o->batch = o->batch ? o->batch : 8;
     o->beta1 = o->beta1 > 0.0 ? o->beta1 : 0.9;
     o->beta2 = o->beta2 > 0.0 ? o->beta2 : 0.999;
@@ -172,10 +175,34 @@ static ascc_status take_arrays(ascc_trainer *t)
     for (size_t i = 0; i < t->tensor_count; i++)
         memcpy(t->weights + t->tensor[i].first, t->model->weights + t->tensor[i].offset,
                t->tensor[i].count * sizeof *t->weights);
+    memset(t->weights + t->learned.first, 0, t->learned.count * sizeof *t->weights);
     memcpy(t->average, t->weights, t->parameter_count * sizeof *t->average);
     return t->options.whiten < 0 ? ASCC_OK
                                  : ascc_whitening_create(&t->whitening, &t->allocator, t->model,
                                                          t->tensor, t->tensor_count);
+}
+
+/* Two copies of the model's file, with room for what is learned in its header. */
+static ascc_status copy_file(ascc_trainer *t, const void *model, size_t size)
+{
+    ascc_status status =
+        ascc_learned_open(&t->learned, t->options.learn, &t->model->plan, &t->message);
+    if (status == ASCC_OK && t->learned.count)
+        status = ascc_learned_make_room(&t->learned, &t->allocator, model, size, &t->bytes,
+                                        &t->byte_count, &t->message);
+    if (status != ASCC_OK)
+        return status;
+    if (!t->bytes) {
+        t->byte_count = size;
+        t->bytes = take(t, size, 1);
+        if (t->bytes)
+            memcpy(t->bytes, model, size);
+    }
+    t->averaged_bytes = take(t, t->byte_count, 1);
+    if (!t->bytes || !t->averaged_bytes)
+        return ASCC_ERROR_MEMORY;
+    memcpy(t->averaged_bytes, t->bytes, t->byte_count);
+    return ASCC_OK;
 }
 
 static ascc_status open_model(ascc_trainer *t, const void *model, size_t size)
@@ -186,17 +213,13 @@ static ascc_status open_model(ascc_trainer *t, const void *model, size_t size)
         ascc_context_message(t->context, text, sizeof text);
         return REFUSE(status, "%s", text);
     }
-    t->byte_count = size;
-    t->bytes = take(t, size, 1);
-    t->averaged_bytes = take(t, size, 1);
-    if (!t->bytes || !t->averaged_bytes)
-        return ASCC_ERROR_MEMORY;
-    memcpy(t->bytes, model, size);
-    memcpy(t->averaged_bytes, model, size);
-    status = ascc_safetensors_open(&t->allocator, t->bytes, size, &t->file, &t->message);
+    status = copy_file(t, model, size);
     if (status == ASCC_OK)
-        status = ascc_safetensors_open(&t->allocator, t->averaged_bytes, size, &t->averaged_file,
-                                       &t->message);
+        status =
+            ascc_safetensors_open(&t->allocator, t->bytes, t->byte_count, &t->file, &t->message);
+    if (status == ASCC_OK)
+        status = ascc_safetensors_open(&t->allocator, t->averaged_bytes, t->byte_count,
+                                       &t->averaged_file, &t->message);
     if (status != ASCC_OK)
         return status;
     if (!ascc_safetensors_metadata(&t->file, "network"))
@@ -206,7 +229,10 @@ static ascc_status open_model(ascc_trainer *t, const void *model, size_t size)
     for (int i = 7; i >= 0; i--)
         length = length << 8 | t->bytes[i];
     t->header_count = 8 + (size_t)length;
-    return find_tensors(t);
+    status = find_tensors(t);
+    t->learned.first = t->parameter_count;
+    t->parameter_count += t->learned.count;
+    return status;
 }
 
 static ascc_status make(ascc_train_context *context, const ascc_trainer_options *options,
@@ -344,6 +370,7 @@ void ascc_trainer_apply(ascc_trainer *t)
     for (size_t i = 0; i < t->tensor_count; i++)
         memcpy(t->model->weights + t->tensor[i].offset, t->weights + t->tensor[i].first,
                t->tensor[i].count * sizeof *t->weights);
+    ascc_learned_apply(&t->learned, t->weights + t->learned.first, &t->model->plan);
     ascc_packed_update(&t->model->packed, &t->model->plan);
     ascc_transposed_update(&t->transposed, &t->model->plan, &t->model->packed);
 }
@@ -361,6 +388,10 @@ ascc_status ascc_trainer_set_parameters(ascc_trainer *t, const float *values)
                 return FAIL(ASCC_ERROR_ARGUMENT,
                             "tensor '%s': number %zu is not finite, or negative where it damps",
                             t->file.tensor[i].name, k - t->tensor[i].first);
+    if (!ascc_learned_takes(&t->learned, values + t->learned.first))
+        return FAIL(
+            ASCC_ERROR_ARGUMENT,
+            "constants of the relaxation: one is not finite, or none that a model may have");
     memcpy(t->weights, values, t->parameter_count * sizeof *values);
     t->changed = false;
     memcpy(t->average, values, t->parameter_count * sizeof *values);
@@ -370,9 +401,12 @@ ascc_status ascc_trainer_set_parameters(ascc_trainer *t, const float *values)
 
 /* ---- Gradients ---- */
 
-/* Gradient by parameter from one laid out as the model's weights, times a share. */
-static void add_gradient(ascc_trainer *t, const float *laid_out, float share, float *to)
+/* Gradient by parameter from one laid out as the model's weights and one of constants, times a share. */
+static void add_gradient(ascc_trainer *t, const float *laid_out,
+                         const ascc_constant_gradients *constants, float share, float *to)
 {
+    ascc_learned_add_gradient(&t->learned, constants, t->weights + t->learned.first, share,
+                              to + t->learned.first);
     for (size_t i = 0; i < t->tensor_count; i++) {
         const ascc_trained_tensor *tensor = &t->tensor[i];
         const float *from = laid_out + tensor->offset;
@@ -436,7 +470,7 @@ ascc_status ascc_trainer_gradient(ascc_trainer *t, size_t sequence, size_t frame
     *loss = result.loss;
     if (gradient) {
         memset(gradient, 0, t->parameter_count * sizeof *gradient);
-        add_gradient(t, t->gradients, 1.0f, gradient);
+        add_gradient(t, t->gradients, &result.constants, 1.0f, gradient);
     }
     return ASCC_OK;
 }
@@ -594,6 +628,12 @@ static void move(ascc_trainer *t)
             t->weights[k] = (float)w;
             t->average[k] = (float)(keep * (double)t->average[k] + (1.0 - keep) * w);
         }
+    for (size_t k = t->learned.first; k < t->parameter_count; k++)
+        t->weights[k] = (float)((double)t->weights[k] - t->step[k]);
+    ascc_learned_bound(&t->learned, t->weights + t->learned.first);
+    for (size_t k = t->learned.first; k < t->parameter_count; k++)
+        t->average[k] =
+            (float)(keep * (double)t->average[k] + (1.0 - keep) * (double)t->weights[k]);
 }
 
 static double now(void)
@@ -626,7 +666,7 @@ static ascc_status sum_up(ascc_trainer *t, ascc_training_report *report)
     for (int32_t b = 0; b < t->batch; b++)
         if (!t->result[b].skipped)
             add_gradient(t, t->gradients + (size_t)b * t->model->weight_count,
-                         1.0f / (float)counted, t->gradient);
+                         &t->result[b].constants, 1.0f / (float)counted, t->gradient);
     ascc_whitening_gradient(&t->whitening, t->gradient);
     report->loss /= counted ? counted : 1;
     for (size_t k = 0; k < t->parameter_count; k++)

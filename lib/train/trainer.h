@@ -6,6 +6,7 @@
 
 #include "model/model.h"
 #include "model/operation.h"
+#include "learned.h"
 #include "rollout.h"
 #include "train_context.h"
 #include "whitening.h"
@@ -23,7 +24,8 @@ struct ascc_trainer {
     size_t byte_count, header_count; /* header_count: of the bytes that weights do not change */
     ascc_safetensors file, averaged_file;
     ascc_trained_tensor *tensor;
-    size_t tensor_count, parameter_count;
+    size_t tensor_count, parameter_count; /* those of tensors come first */
+    ascc_learned learned;
     ascc_trainer_options options; /* defaults filled in */
     ascc_training_stage *stage;
     ascc_kept_sequence *sequence;
