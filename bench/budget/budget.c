@@ -2,12 +2,15 @@
  * ran, and how far it is from another run. SPDX-License-Identifier: MIT
  *
  *   budget MODEL[,MODEL...] [--budget MS] [--sleep V] [--detail X] [--size N] [--frames N] [--keep FILE] [--like FILE]
+ *          [--slices FILE] [--slide V]
  *
  * The pool has N x N / 2 x N particles, a block an eighth of N^3, which falls after a sixth of the frames, is taken
  * out after a half and let in again after two thirds. A line of CSV for each frame; time is CPU time of the one
  * thread, so that other programs on the machine count little. --keep writes the places of every tenth frame, --like
  * reads those of another run: the Chamfer distance to it, both ways in the mean. --detail: the first model runs, the last
- * one the share X of the pool's length, and a ramp of four spacings between them.
+ * one the share X of the pool's length, and a ramp of four spacings between them. --slices: mean density and speed of
+ * slices across that length, of all frames. --slide: no block falls, and the pool begins to slide at this speed, m/s, in
+ * the middle, less towards its ends.
  */
 #include <math.h>
 #include <stdbool.h>
@@ -22,12 +25,14 @@
 #include "measures.h"
 
 #define WALL_SPACING 0.64 /* in particle spacings */
-#define RAMP 4.0          /* spacings */
-enum { EVERY = 10 };      /* frames from one that is kept to the next */
+#define PI 3.14159265358979323846
+#define RAMP 4.0                      /* spacings */
+enum { EVERY = 10 };                  /* frames from one that is kept to the next */
+enum { SLICE = 2, MOST_SLICES = 64 }; /* spacings */
 
 typedef struct options {
-    const char *models, *keep, *like;
-    double budget, sleep, detail;
+    const char *models, *keep, *like, *slices;
+    double budget, sleep, detail, slide;
     int size, frames;
 } options;
 
@@ -43,6 +48,7 @@ typedef struct run {
     uint64_t *ids;  /* [block] of the one that is there */
     double *places; /* room for all */
     FILE *kept, *other;
+    double density[MOST_SLICES], speed[MOST_SLICES], rows[MOST_SLICES]; /* sums */
 } run;
 
 static _Noreturn void fail(const run *r, const char *what)
@@ -109,12 +115,19 @@ static void add_pool(run *r)
         walls = add_sides(wall, normal, walls, edge, axis, r->spacing);
     const size_t fluid =
         fill(r->places, (int[]){n, n / 2, n}, (const double[]){1, 1, 1}, r->spacing);
+    double *velocity = calloc(3 * fluid, sizeof *velocity);
+    if (!velocity)
+        fail(r, "no memory");
+    for (size_t i = 0; i < fluid; i++)
+        velocity[3 * i] = r->o->slide * sin(PI * r->places[3 * i] / (edge[0] * r->spacing));
+    const ascc_const_array v = {.data = velocity, .scalar = ASCC_DOUBLE};
     const ascc_const_array x = {.data = r->places, .scalar = ASCC_DOUBLE};
     const ascc_const_array w = {.data = wall, .scalar = ASCC_DOUBLE};
     const ascc_const_array up = {.data = normal, .scalar = ASCC_DOUBLE};
-    if (ascc_particles_add_fluid(r->particles, fluid, &x, NULL, NULL, NULL) != ASCC_OK ||
+    if (ascc_particles_add_fluid(r->particles, fluid, &x, &v, NULL, NULL) != ASCC_OK ||
         ascc_particles_add_boundary(r->particles, walls, &w, &up, 0, NULL) != ASCC_OK)
         fail(r, "particles");
+    free(velocity);
     free(wall);
     free(normal);
 }
@@ -203,6 +216,45 @@ static double compare(run *r, size_t count)
     return 0.5 * (there + back);
 }
 
+/* Adds a frame to the sums of the slices. */
+static void add_slices(run *r, size_t count)
+{
+    double *velocity = malloc(count * 3 * sizeof *velocity),
+           *density = malloc(count * sizeof *density);
+    const ascc_array x = {.data = r->places, .scalar = ASCC_DOUBLE};
+    const ascc_array v = {.data = velocity, .scalar = ASCC_DOUBLE};
+    const ascc_measure_set set = {.dimension = 3, .count = count, .position = r->places};
+    if (!velocity || !density ||
+        ascc_particles_get(r->particles, ASCC_FLUID, ASCC_POSITION, 0, count, &x) != ASCC_OK ||
+        ascc_particles_get(r->particles, ASCC_FLUID, ASCC_VELOCITY, 0, count, &v) != ASCC_OK ||
+        ascc_measure_density(&set, 0, NULL, 2.0 * r->spacing, 1, density) != ASCC_OK)
+        fail(r, "slices");
+    for (size_t i = 0; i < count; i++) {
+        const double at = floor(r->places[3 * i] / r->spacing / SLICE), *w = velocity + 3 * i;
+        if (!(at >= 0.0 && at < MOST_SLICES))
+            continue;
+        r->density[(int)at] += density[i] / ascc_measure_rest_density(3);
+        r->speed[(int)at] += sqrt(w[0] * w[0] + w[1] * w[1] + w[2] * w[2]);
+        r->rows[(int)at] += 1.0;
+    }
+    free(velocity);
+    free(density);
+}
+
+static void write_slices(const run *r)
+{
+    FILE *f = fopen(r->o->slices, "w");
+    if (!f)
+        fail(r, r->o->slices);
+    fputs("spacings,density,speed\n", f);
+    for (int k = 0; k < MOST_SLICES; k++)
+        if (r->rows[k] > 0.0)
+            fprintf(f, "%d,%.5f,%.5f\n", SLICE * k + SLICE / 2, r->density[k] / r->rows[k],
+                    r->speed[k] / r->rows[k]);
+    if (fclose(f) != 0)
+        fail(r, r->o->slices);
+}
+
 /* A step on the first rung, with the last one's share by place. */
 static ascc_status run_detailed(run *r)
 {
@@ -225,7 +277,8 @@ static void run_frame(run *r, int frame)
     ascc_ladder_statistics told = {.size = sizeof told};
     ascc_step_statistics step = {.size = sizeof step};
     ascc_measures motion = {.size = sizeof motion};
-    change_scene(r, frame);
+    if (r->o->slide == 0.0)
+        change_scene(r, frame);
     const ascc_status status =
         r->o->detail > 0.0 ? run_detailed(r) : ascc_ladder_run(r->ladder, r->particles, NULL, 1);
     if (status != ASCC_OK)
@@ -239,10 +292,14 @@ static void run_frame(run *r, int frame)
     if (frame % EVERY == EVERY - 1)
         printf("%.6f", compare(r, count));
     printf("\n");
+    if (r->o->slices)
+        add_slices(r, count);
 }
 
 static void close_run(run *r)
 {
+    if (r->o->slices)
+        write_slices(r);
     if (r->kept && fclose(r->kept) != 0)
         fail(r, "the kept places cannot be written");
     if (r->other)
@@ -276,13 +333,17 @@ int main(int argc, char **argv)
             o.keep = value;
         else if (strcmp(name, "--like") == 0)
             o.like = value;
+        else if (strcmp(name, "--slide") == 0)
+            o.slide = atof(value);
+        else if (strcmp(name, "--slices") == 0)
+            o.slices = value;
         else
             good = false;
     }
     if (!good || o.size < 4 || o.frames < 6) {
         fprintf(stderr,
                 "usage: budget MODEL[,MODEL...] [--budget MS] [--sleep V] [--detail X] [--size N] "
-                "[--frames N] [--keep FILE] [--like FILE]\n");
+                "[--frames N] [--keep FILE] [--like FILE] [--slices FILE] [--slide V]\n");
         return 2;
     }
     run r = {.o = &o};

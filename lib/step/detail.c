@@ -19,8 +19,8 @@
 #include "points/blocks.h"
 
 /* How far beyond what has a weight the better network sees, spacings at least; in blocks, of which it is so many. */
-#define SIGHT 6.0
-#define REACH 2
+#define SIGHT 4.0
+#define REACH 1
 
 #define ALIKE 1e-6
 
