@@ -1,7 +1,7 @@
 #!/bin/sh
 # Measures the networks of examples/models and writes the tables of their cards, docs/models/*.md: what stands
-# above the line "## Measured" of a card is kept. Takes some minutes.
-# sh docs/make_cards.sh [NAME...]      needs ../shared/data and build/examples/ascc
+# above the line "## Measured" of a card is kept. Those of examples/models/baselines share one, `baselines`.
+# sh docs/make_cards.sh [NAME...]      needs ../shared/data and build/examples/ascc; takes some minutes
 # SPDX-License-Identifier: MIT
 set -eu
 cd "$(dirname "$0")/.."
@@ -66,9 +66,19 @@ droplets() {
         grep -E '^(momentum error|angular mom. error|energy)' | sed 's/^/    /'
 }
 
-[ $# -gt 0 ] || set -- $(cd examples/models && ls *.safetensors | sed 's/\.safetensors//')
+# What was measured of a model file.
+measured() {
+    table "$1"
+    echo
+    echo "Two drops that collide without gravity and walls, 300 steps:"
+    echo
+    droplets "$1"
+    echo
+    $ascc info "$1" | sed "s/^/    /; s|$(dirname "$1")/||"
+}
+
+[ $# -gt 0 ] || set -- $(cd examples/models && ls *.safetensors | sed 's/\.safetensors//') baselines
 for name in "$@"; do
-    model=examples/models/$name.safetensors
     card=docs/models/$name.md
     [ -f "$card" ] || echo "# $name" >"$card"
     sed '/^## Measured/,$d' "$card" >"$csv.card"
@@ -80,13 +90,15 @@ for name in "$@"; do
         echo "rollout from the first frame to the end (density with walls counted; figures as in docs/measures.md). None of these sequences was looked at"
         echo "while training. Figures of published networks came with the data."
         echo
-        table "$model"
-        echo
-        echo "Two drops that collide without gravity and walls, 300 steps:"
-        echo
-        droplets "$model"
-        echo
-        $ascc info "$model" | sed 's/^/    /; s|examples/models/||'
+        if [ "$name" = baselines ]; then
+            for model in examples/models/baselines/*.safetensors; do
+                printf '### %s\n\n' "$(basename "$model" .safetensors)"
+                measured "$model"
+                echo
+            done
+        else
+            measured "examples/models/$name.safetensors"
+        fi
     } >"$csv.new"
     cp "$csv.new" "$card"
 done

@@ -1,5 +1,5 @@
 #!/bin/sh
-# The networks that are shipped: small, as cheap as said, and exact about momentum; prints TAP.
+# The networks that are shipped: small, as cheap as said, and exact about momentum, and baselines; prints TAP.
 # $1: a build folder. SPDX-License-Identifier: MIT
 cd "$(dirname "$0")/.." || exit 1
 ascc=${1:-build}/examples/ascc
@@ -51,5 +51,21 @@ file=examples/models/paper3d.safetensors
 check "paper3d is at most 1 MB" small "$file"
 check "paper3d has a card with measurements" card paper3d
 check "paper3d conserves momentum to the bit when drops collide" exact "$file" 3d
+
+# Other methods', for comparison: what they lose is told.
+described() { grep -q "^### $1\$" docs/models/baselines.md; }
+loses() {
+    "$ascc" sim "$1" "droplets-$2" --size 8 -n 20 -o "$folder/d" 2>&1 |
+        grep -E '^momentum error .*\([-0-9 ]*[1-9][-0-9 ]* quanta.*this model does not conserve it'
+}
+for file in examples/models/baselines/*.safetensors; do
+    model=$(basename "$file" .safetensors)
+    dimension=$(echo "$model" | grep -o '[23]d')
+    check "$model is at most 1 MB" small "$file"
+    check "$model has its part of a card with measurements" described "$model"
+    check "$model says that it conserves nothing" conserves "$file" 'nothing exactly'
+    check "what momentum $model loses is told" loses "$file" "$dimension"
+    check "$model gives the same bits on three threads" same "$file" "$dimension"
+done
 echo "1..$number"
 exit $failed
