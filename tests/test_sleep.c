@@ -422,6 +422,65 @@ static void fluid_beside_what_sleeps_moves_as_beside_what_rests(void **state)
     close_pool(&awake);
 }
 
+/* Steps of a handle that remembers the last one, and of new ones, which cannot: the same bits. Returns the least
+ * share of the points that a step looked at. */
+static double run_as_if_new(world *w, const ascc_forces *forces, int steps)
+{
+    const size_t size = ascc_particles_snapshot_size(w->particles);
+    unsigned char *bytes = malloc(size);
+    ascc_step_statistics s = {.size = sizeof s};
+    double least = 1.0;
+    for (int n = 0; n < steps; n++) {
+        const ascc_step_options options = {.size = sizeof options, .sleep_speed = 0.5};
+        ascc_step *kept = w->step;
+        assert_int_equal(ascc_particles_snapshot(w->particles, bytes, size), ASCC_OK);
+        assert_int_equal(ascc_step_create(w->context, w->model, &options, &w->step), ASCC_OK);
+        (void)run(w, forces, 1);
+        const uint64_t hash = ascc_particles_hash(w->particles);
+        assert_int_equal(ascc_step_get_statistics(w->step, &s), ASCC_OK);
+        const double all = (double)s.level_points[0];
+        ascc_step_destroy(&w->step);
+        w->step = kept;
+        assert_int_equal(ascc_particles_restore(w->particles, bytes, size), ASCC_OK);
+        (void)run(w, forces, 1);
+        assert_true(ascc_particles_hash(w->particles) == hash);
+        assert_int_equal(ascc_step_get_statistics(w->step, &s), ASCC_OK);
+        least = fmin(least, (double)s.level_points[0] / all);
+    }
+    free(bytes);
+    return least;
+}
+
+static void what_a_step_remembers_changes_no_bit(void **state)
+{
+    (void)state;
+    const pool long_channel = {.cells = {100, 4, 4}, .threads = 2, .sleep_speed = 0.5};
+    world w = open_asleep(&long_channel);
+    ascc_particles *p = w.particles;
+    add_block(p, (const int[]){2, 2, 2}, (const double[]){0.3, 0.25, 0.1}, false);
+    assert_true(run_as_if_new(&w, NULL, 12) < 0.6);
+    /* Whatever the host changes, near the fluid that moves and far away. */
+    const double mass = 0.15, v[3] = {0.3, 0.2, 0.0}, down[3] = {0.0, -9.0, 0.0};
+    const ascc_const_array heavy = {.data = &mass, .scalar = ASCC_DOUBLE};
+    const ascc_const_array kick = {.data = v, .scalar = ASCC_DOUBLE};
+    assert_int_equal(ascc_particles_set(p, ASCC_FLUID, ASCC_MASS, 40, 1, &heavy), ASCC_OK);
+    (void)run_as_if_new(&w, NULL, 2);
+    assert_int_equal(ascc_particles_set(p, ASCC_FLUID, ASCC_VELOCITY, 1500, 1, &kick), ASCC_OK);
+    (void)run_as_if_new(&w, NULL, 2);
+    uint64_t id[20];
+    memcpy(id, p->id + 700, sizeof id);
+    assert_int_equal(ascc_particles_remove(p, 20, id), ASCC_OK);
+    (void)run_as_if_new(&w, NULL, 2);
+    add_block(p, (const int[]){2, 1, 2}, (const double[]){4.0, 0.3, 0.1}, false);
+    (void)run_as_if_new(&w, NULL, 4);
+    memcpy(p->wall_normal, p->wall_normal + 3, 3 * sizeof *p->wall_normal); /* behind its back */
+    p->wall_position[0] += 0.01;
+    (void)run_as_if_new(&w, NULL, 2);
+    const ascc_forces forces = {.size = sizeof forces, .gravity = down};
+    (void)run_as_if_new(&w, &forces, 2);
+    close_pool(&w);
+}
+
 /* Outputs over fluid alone and over fluid and walls, kernels in grids and in a basis, pairs and none. */
 static void momentum_adds_up_with_every_kind_of_output(void **state)
 {
@@ -486,6 +545,7 @@ int main(void)
         cmocka_unit_test(bits_depend_on_neither_threads_nor_order),
         cmocka_unit_test(a_snapshot_knows_what_sleeps),
         cmocka_unit_test(fluid_beside_what_sleeps_moves_as_beside_what_rests),
+        cmocka_unit_test(what_a_step_remembers_changes_no_bit),
         cmocka_unit_test(momentum_adds_up_with_every_kind_of_output),
         cmocka_unit_test(without_memory_nothing_is_lost),
     };

@@ -3,6 +3,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "kept.h"
 #include "network.h"
 #include "sheets.h"
 
@@ -352,7 +353,8 @@ static ascc_status demand_output(ascc_network_run *run)
     uint8_t *active = run->value[source].active;
     uint8_t *guessed =
         run->plan->relaxation.guess ? run->value[run->plan->relaxation.guess].active : NULL;
-    for (size_t i = 0; i < h->fluid_count; i++) {
+    const size_t rows = h->set[ASCC_SET_FLUID].count;
+    for (size_t i = 0; i < rows; i++) {
         const bool wanted = !ascc_hierarchy_is_quiet(h, i);
         active[set == ASCC_SET_FLUID ? i : h->whole[ASCC_SET_FLUID][i]] = wanted;
         if (guessed)
@@ -365,12 +367,11 @@ static ascc_status demand_output(ascc_network_run *run)
         return ascc_fail(run->tools->message, ASCC_ERROR_MEMORY, "no memory for the last layer");
     memcpy(fluid, active, h->set[set].count);
     ascc_status status = demand_rows(run, key[0], fluid, active);
-    for (size_t i = 0; h->share && i < h->fluid_count;
-         i++) /* what counts for nothing need not be there */
+    for (size_t i = 0; h->share && i < rows; i++) /* what counts for nothing need not be there */
         if (h->share[i] == 0.0f)
             active[set == ASCC_SET_FLUID ? i : h->whole[ASCC_SET_FLUID][i]] = 0;
     /* Rows that sleep push the others with the pressure that they guess. */
-    for (size_t i = 0; guessed && h->idle && status == ASCC_OK && i < h->fluid_count; i++)
+    for (size_t i = 0; guessed && h->idle && status == ASCC_OK && i < rows; i++)
         guessed[i] |= active[set == ASCC_SET_FLUID ? i : h->whole[ASCC_SET_FLUID][i]];
     for (int i = 1; i < ASCC_MAX_LISTS && status == ASCC_OK && key[i] >= 0; i++)
         status = ascc_rows_make(&run->rows[key[i]], run->tools, fluid);
@@ -413,7 +414,10 @@ static ascc_status demand_term(ascc_network_run *run, const ascc_layer *layer, i
 static ascc_status demand_layer(ascc_network_run *run, int32_t l)
 {
     const ascc_layer *layer = &run->plan->layer[l];
+    const ascc_hierarchy *h = run->hierarchy;
     ascc_status status = ASCC_OK;
+    if (h->kept)
+        ascc_kept_demand(h->kept, l, h->set[layer->set].count, run->value[l + 2].active);
     for (int32_t t = 0; t < layer->term_count && status == ASCC_OK; t++)
         status = demand_term(run, layer, layer->first_term + t, run->value[l + 2].active);
     return status;

@@ -7,6 +7,7 @@
 #include <string.h>
 
 #include "early_rows.h"
+#include "kept.h"
 #include "network.h"
 
 typedef struct layer_job {
@@ -523,8 +524,12 @@ ascc_status ascc_network_forward(ascc_network_run *run, const float *fluid_featu
         if (status == ASCC_OK)
             status = carry_layer(run, l, list);
         if (status == ASCC_OK)
+            ascc_kept_fill(run, l);
+        if (status == ASCC_OK)
             status = refresh_value(run, l);
     }
+    if (status == ASCC_OK && run->hierarchy->kept)
+        ascc_kept_end(run->hierarchy->kept);
     if (status == ASCC_OK && run->guess)
         ascc_workers_run(run->tools->workers, run->hierarchy->set[ASCC_SET_FLUID].count, 4096,
                          keep_guess, run);

@@ -46,6 +46,7 @@ typedef struct sort_in {
     ascc_hierarchy *hierarchy;
     const ascc_scene *scene;
     int32_t dimension;
+    size_t fluid_count;    /* rows that are looked at */
     const uint32_t *kept;  /* boundary rows */
     const uint32_t *order; /* rows of raw in the order of the set */
     ascc_points raw;       /* fluid, then kept boundary, in the host's order; no low words */
@@ -54,16 +55,30 @@ typedef struct sort_in {
     atomic_size_t too_far;         /* 1 + smallest row of raw */
 } sort_in;
 
+/* The host's row of a row of raw: of fluid, or fluid_count + of boundary. */
+static size_t host_row(const sort_in *job, size_t row)
+{
+    const ascc_scene *scene = job->scene;
+    if (row < job->fluid_count)
+        return scene->row ? scene->row[row] : row;
+    return scene->fluid_count + job->kept[row - job->fluid_count];
+}
+
+static const double *place_of(const sort_in *job, size_t row)
+{
+    const ascc_scene *scene = job->scene;
+    const size_t d = (size_t)job->dimension, host = host_row(job, row);
+    return host < scene->fluid_count ? scene->fluid + host * d
+                                     : scene->boundary + (host - scene->fluid_count) * d;
+}
+
 static void convert(void *data, size_t begin, size_t end, int32_t slot)
 {
     (void)slot;
     sort_in *job = data;
-    const ascc_scene *scene = job->scene;
     const size_t d = (size_t)job->dimension;
     for (size_t i = begin; i < end; i++) {
-        const double *x = i < scene->fluid_count
-                              ? scene->fluid + i * d
-                              : scene->boundary + job->kept[i - scene->fluid_count] * d;
+        const double *x = place_of(job, i);
         bool good = true;
         for (size_t c = 0; c < 3; c++) {
             job->raw.position[c][i] = 0;
@@ -81,16 +96,14 @@ static void gather(void *data, size_t begin, size_t end, int32_t slot)
     (void)slot;
     sort_in *job = data;
     ascc_hierarchy *h = job->hierarchy;
-    const size_t fluid_count = h->fluid_count;
     size_t fluid = 0;
     for (size_t i = begin; i < end; i++) {
         const size_t row = job->order[i];
         const int64_t at[3] = {job->raw.position[0][row], job->raw.position[1][row],
                                job->raw.position[2][row]};
         ascc_points_set(&h->set[ASCC_SET_ALL], i, at);
-        h->origin[i] = row < fluid_count ? (uint32_t)row
-                                         : (uint32_t)fluid_count + job->kept[row - fluid_count];
-        fluid += row < fluid_count;
+        h->origin[i] = (uint32_t)host_row(job, row);
+        fluid += row < job->fluid_count;
     }
     job->first[begin / job->part] = fluid;
 }
@@ -183,19 +196,19 @@ bool ascc_hierarchy_reads_whole(const ascc_plan *plan)
 
 /* Room for the sets of level 0 and the links between their rows. */
 static bool take_sets(ascc_hierarchy *h, ascc_arena *arena, const ascc_plan *plan,
-                      size_t boundary_count)
+                      size_t fluid_count, size_t boundary_count)
 {
-    const size_t count = h->fluid_count + boundary_count;
+    const size_t count = fluid_count + boundary_count;
     h->origin = ascc_arena_take(arena, count, sizeof *h->origin);
     h->part = ascc_arena_take(arena, count, sizeof *h->part);
-    h->whole[0] = ascc_arena_take(arena, h->fluid_count, sizeof(uint32_t));
+    h->whole[0] = ascc_arena_take(arena, fluid_count, sizeof(uint32_t));
     h->whole[1] = ascc_arena_take(arena, boundary_count, sizeof(uint32_t));
-    h->place[0] = ascc_arena_take(arena, h->fluid_count, 4 * sizeof(int32_t));
+    h->place[0] = ascc_arena_take(arena, fluid_count, 4 * sizeof(int32_t));
     h->place[1] = ascc_arena_take(arena, boundary_count, 4 * sizeof(int32_t));
     return h->origin && h->part && h->whole[0] && h->whole[1] && h->place[0] && h->place[1] &&
            ascc_points_room(&h->set[ASCC_SET_ALL], arena, count,
                             ascc_hierarchy_reads_whole(plan) ? ascc_arena_take : ascc_arena_lend) &&
-           ascc_points_take(&h->set[ASCC_SET_FLUID], arena, h->fluid_count) &&
+           ascc_points_take(&h->set[ASCC_SET_FLUID], arena, fluid_count) &&
            ascc_points_take(&h->set[ASCC_SET_BOUNDARY], arena, boundary_count);
 }
 
@@ -216,21 +229,23 @@ static ascc_status build_level_zero(ascc_hierarchy *h, const ascc_search_tools *
     if (!kept)
         return ascc_fail(tools->message, ASCC_ERROR_MEMORY, "no memory for the boundary");
     const size_t kept_count = keep_boundary(kept, plan, scene);
-    const size_t count = scene->fluid_count + kept_count;
+    const size_t fluid = scene->row ? scene->row_count : scene->fluid_count;
+    const size_t count = fluid + kept_count;
     uint32_t *order = ascc_arena_lend(arena, count, sizeof *order);
-    sort_in job = {.hierarchy = h, .scene = scene, .dimension = plan->dimension};
+    sort_in job = {
+        .hierarchy = h, .scene = scene, .dimension = plan->dimension, .fluid_count = fluid};
     job.kept = kept;
     job.order = order;
     job.part = ascc_part_size(count);
-    if (!order || !lend_raw(&job.raw, arena, count) || !take_sets(h, arena, plan, kept_count))
+    if (!order || !lend_raw(&job.raw, arena, count) ||
+        !take_sets(h, arena, plan, fluid, kept_count))
         return ascc_fail(tools->message, ASCC_ERROR_MEMORY, "no memory for %zu points", count);
 
     ascc_workers_run(tools->workers, count, 4096, convert, &job);
     const size_t bad = atomic_load(&job.too_far);
     if (bad)
-        return bad <= scene->fluid_count
-                   ? too_far(tools, "fluid", bad - 1)
-                   : too_far(tools, "boundary", kept[bad - 1 - scene->fluid_count]);
+        return bad <= fluid ? too_far(tools, "fluid", host_row(&job, bad - 1))
+                            : too_far(tools, "boundary", kept[bad - 1 - fluid]);
     h->extent = ascc_extent_of(&job.raw, tools->workers);
     const ascc_status status =
         ascc_points_order(tools, &job.raw, &h->extent, ascc_grid_cell(h->base_radius), order);
@@ -297,10 +312,26 @@ static ascc_status find_halo_rows(ascc_hierarchy *h, const ascc_search_tools *to
     return ascc_early_rows_find(h, tools, ASCC_SET_FLUID);
 }
 
-static ascc_status build_level(ascc_hierarchy *h, const ascc_search_tools *tools,
-                               const ascc_plan *plan, int level)
+/* Fluid, and what stands for the rest of it. */
+static bool lend_with_far(ascc_points *both, const ascc_search_tools *tools,
+                          const ascc_points *fluid, const ascc_points *far)
 {
-    const ascc_points *all = &h->set[plan->fluid_sampled ? ASCC_SET_FLUID : ASCC_SET_ALL];
+    both->count = fluid->count + far->count;
+    for (int c = 0; c < 3; c++) {
+        both->low[c] = NULL;
+        both->position[c] = ascc_arena_lend(tools->arena, both->count, sizeof(int64_t));
+        if (!both->position[c])
+            return false;
+        memcpy(both->position[c], fluid->position[c], fluid->count * sizeof(int64_t));
+        memcpy(both->position[c] + fluid->count, far->position[c], far->count * sizeof(int64_t));
+    }
+    return true;
+}
+
+/* all: what the level is sampled from. */
+static ascc_status build_level(ascc_hierarchy *h, const ascc_search_tools *tools,
+                               const ascc_plan *plan, const ascc_points *all, int level)
+{
     ascc_points *samples = &h->set[ASCC_SET_LEVEL + level - 1];
     const double voxel = plan->level[level].voxel * h->scale.inverse;
     ascc_points own;
@@ -327,6 +358,13 @@ static ascc_status build_level(ascc_hierarchy *h, const ascc_search_tools *tools
                                anchor);
 }
 
+ascc_scale ascc_hierarchy_scale(const ascc_plan *plan)
+{
+    double smallest, largest;
+    ascc_plan_radii(plan, &smallest, &largest);
+    return ascc_scale_for_radius(largest);
+}
+
 ascc_status ascc_hierarchy_build(ascc_hierarchy *h, const ascc_search_tools *tools,
                                  const ascc_plan *plan, const ascc_scene *scene)
 {
@@ -349,8 +387,17 @@ ascc_status ascc_hierarchy_build(ascc_hierarchy *h, const ascc_search_tools *too
         status = find_drift(h, tools, plan, scene);
     if (status == ASCC_OK)
         status = ascc_sheets_find(h, tools, plan, scene);
+    const ascc_arena_mark mark = ascc_arena_mark_of(tools->arena);
+    const ascc_points *sampled = &h->set[plan->fluid_sampled ? ASCC_SET_FLUID : ASCC_SET_ALL];
+    ascc_points both;
+    if (status == ASCC_OK && scene->far) {
+        if (!lend_with_far(&both, tools, sampled, scene->far))
+            return ascc_fail(tools->message, ASCC_ERROR_MEMORY, "no memory for coarse points");
+        sampled = &both;
+    }
     for (int level = 1; status == ASCC_OK && level < plan->level_count; level++)
-        status = build_level(h, tools, plan, level);
+        status = build_level(h, tools, plan, sampled, level);
+    ascc_arena_return(tools->arena, mark);
     if (status != ASCC_OK)
         return status;
     for (int s = ASCC_SET_LEVEL; s < ASCC_SET_LEVEL + plan->level_count - 1; s++)

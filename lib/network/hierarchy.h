@@ -23,7 +23,7 @@ typedef struct ascc_hierarchy {
     ascc_scale scale;
     ascc_points
         set[ASCC_MAX_SETS]; /* ASCC_SET_ALL has but a count where no layer or level reads it */
-    size_t fluid_count;     /* rows of the host's fluid */
+    size_t fluid_count;     /* rows of the host's fluid, of which the set may have a part */
     /* Rows of ASCC_SET_ALL, fluid and boundary in one order: */
     uint32_t *origin;    /* the host's row: fluid row, or fluid_count + boundary row */
     uint32_t *part;      /* the row in ASCC_SET_FLUID or ASCC_SET_BOUNDARY */
@@ -39,6 +39,7 @@ typedef struct ascc_hierarchy {
     ascc_row_order order[ASCC_MAX_LEVELS]; /* with a halo: of fluid, then of levels */
     float *
         drift; /* motions of walls in spacings a time step, [boundary set row][4]; NULL: all rest */
+    struct ascc_kept *kept; /* values of an earlier step that still hold (kept.h); NULL = none */
     struct ascc_sheets
         *sheets;        /* thin walls that hide what lies beyond (sheets.h); NULL: there is none */
     ascc_extent extent; /* of all sets */
@@ -56,6 +57,10 @@ typedef struct ascc_scene {
     size_t fluid_count, boundary_count;
     const double *fluid, *boundary; /* [count][dimension] */
     const uint8_t *near;            /* [boundary count] 1 = fluid may see it; NULL = all */
+    const uint32_t *row;            /* [row_count] fluid that is looked at, ascending; NULL = all */
+    size_t row_count;
+    const ascc_points
+        *far; /* units: what else holds fluid as coarser levels see it; NULL = nothing */
     /* What tells particles at one place apart, so that the host's order does not; NULL = nothing: */
     const double *velocity, *mass, *normal; /* [fluid][dimension], [fluid], [boundary][dimension] */
     const double *wall_velocity;            /* [boundary][dimension]; NULL = all rest */
@@ -70,6 +75,9 @@ typedef struct ascc_scene {
 /* Builds all sets the plan uses in the arena. errors: MEMORY, RANGE. */
 ascc_status ascc_hierarchy_build(ascc_hierarchy *hierarchy, const ascc_search_tools *tools,
                                  const ascc_plan *plan, const ascc_scene *scene);
+
+/* The scale that the sets of a plan's hierarchies have. */
+ascc_scale ascc_hierarchy_scale(const ascc_plan *plan);
 
 /* Does anything look at places of fluid and walls as one set? */
 bool ascc_hierarchy_reads_whole(const ascc_plan *plan);

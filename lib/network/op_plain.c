@@ -22,7 +22,7 @@ static ascc_status impulses(const ascc_network_run *run, const ascc_impulse_scal
     const size_t d = (size_t)run->plan->dimension, a = ascc_padded(term->inputs);
     const float *value = ascc_term_source(run, term);
     *pair_count = 0;
-    for (size_t i = 0; i < h->fluid_count; i++) {
+    for (size_t i = 0; i < h->set[ASCC_SET_FLUID].count; i++) {
         if (ascc_hierarchy_is_idle(h, i))
             continue;
         const size_t from = set == ASCC_SET_FLUID ? i : h->whole[ASCC_SET_FLUID][i];

@@ -15,13 +15,14 @@
  * network gives, all walls are near. */
 #define MARGIN 4.0
 
-/* The blocks of places; they follow one another mostly in one block. */
-static void add_places(ascc_blocks *blocks, const double *place, size_t count, int32_t dimension,
-                       double edge)
+/* The blocks of fluid that is looked at; rows that follow one another are mostly in one block. */
+static void add_places(ascc_blocks *blocks, const ascc_step_state *state, double edge)
 {
+    const int32_t dimension = state->particles->dimension;
     int64_t at[3], last[3] = {INT64_MAX, 0, 0};
-    for (size_t i = 0; i < count; i++) {
-        ascc_block_of(place + i * (size_t)dimension, dimension, edge, at);
+    for (size_t n = 0; n < ascc_sight_count(state); n++) {
+        const size_t i = ascc_sight_row(state, n);
+        ascc_block_of(state->advance.seen + i * (size_t)dimension, dimension, edge, at);
         if (memcmp(at, last, sizeof at) != 0)
             (void)ascc_blocks_add(blocks, at);
         memcpy(last, at, sizeof last);
@@ -68,12 +69,11 @@ static void mark(uint8_t *near, const ascc_blocks *wide, const ascc_particles *p
 /* Whether a particle goes so far. However walls bend a way, it stays within its length of the end that is seen. */
 static bool goes_far(const ascc_step_state *state, double far)
 {
-    const ascc_particles *p = state->particles;
-    const size_t d = (size_t)p->dimension;
+    const size_t d = (size_t)state->particles->dimension;
     const double dt = state->motion->time_step;
     bool goes = false;
-    for (size_t i = 0; i < p->fluid_count; i++) {
-        const double *const v = state->advance.velocity + i * d;
+    for (size_t n = 0; n < ascc_sight_count(state); n++) {
+        const double *const v = state->advance.velocity + ascc_sight_row(state, n) * d;
         double square = 0.0;
         for (size_t c = 0; c < d; c++)
             square += v[c] * v[c];
@@ -95,14 +95,14 @@ bool ascc_near_walls(ascc_step_state *state, uint8_t **near)
     const double margin = MARGIN * state->network->plan->spacing / state->length_unit;
     const double edge = margin + state->network->wall_reach / state->length_unit;
     if (!(state->network->wall_reach > 0.0) || isinf(edge) || state->advance.walls_move ||
-        p->boundary_count < p->fluid_count / WORTH || goes_far(state, margin))
+        p->boundary_count < ascc_sight_count(state) / WORTH || goes_far(state, margin))
         return true;
     *near = ascc_arena_lend(arena, p->boundary_count, 1);
     const ascc_arena_mark mark_of = ascc_arena_mark_of(arena);
     ascc_blocks blocks, wide;
-    bool room = *near && lend_blocks(&blocks, arena, p->fluid_count);
+    bool room = *near && lend_blocks(&blocks, arena, ascc_sight_count(state));
     if (room) {
-        add_places(&blocks, state->advance.seen, p->fluid_count, p->dimension, edge);
+        add_places(&blocks, state, edge);
         room = lend_blocks(&wide, arena, blocks.count * (p->dimension == 3 ? 27 : 9));
     }
     if (room) {

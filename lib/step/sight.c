@@ -1,5 +1,7 @@
 /* What the network sees: features of all particles, and the point sets of the scene.
  * SPDX-License-Identifier: MIT */
+#include <string.h>
+
 #include "stage.h"
 
 /* vector: m/s of fluid, a normal of boundary, in units of `factor`; motion: the factor that makes of it
@@ -61,10 +63,12 @@ static bool lend_features(ascc_step_state *state, const uint8_t *near)
     double gravity[3] = {0.0, 0.0, 0.0};
     for (size_t c = 0; c < d; c++)
         gravity[c] = state->motion->gravity[c] * plan->time_step * motion / state->time_unit;
-    for (size_t i = 0; i < p->fluid_count; i++)
+    for (size_t n = 0; n < ascc_sight_count(state); n++) {
+        const size_t i = ascc_sight_row(state, n);
         features_of(plan, plan->fluid_features, plan->fluid_feature_count,
                     state->advance.velocity + i * d, p->past + i * (size_t)p->past_count * d, unit,
                     motion, gravity, 0.0, state->fluid_features + i * fluid);
+    }
     for (size_t i = 0; i < p->boundary_count; i++) {
         if (near && !near[i])
             continue;
@@ -141,6 +145,27 @@ static ascc_status take_idle(ascc_step_state *state)
     return ASCC_OK;
 }
 
+/* Values of an earlier step come in where they still hold; rows that nobody looks at are given nothing later on, in
+ * the memory of the velocities. */
+static ascc_status keep_values(ascc_step_state *state)
+{
+    ascc_kept *kept = state->sight.kept;
+    const size_t d = (size_t)state->particles->dimension;
+    size_t row = 0;
+    for (size_t n = 0; state->sight.row && n <= state->sight.row_count; n++) {
+        const size_t next =
+            n < state->sight.row_count ? state->sight.row[n] : state->particles->fluid_count;
+        memset(state->advance.velocity + row * d, 0, (next - row) * d * sizeof(double));
+        row = next + 1;
+    }
+    if (!kept)
+        return ASCC_OK;
+    if (!ascc_kept_begin(kept, &state->hierarchy, state->tools.arena))
+        return ascc_fail(state->tools.message, ASCC_ERROR_MEMORY, "no memory to keep values");
+    state->hierarchy.kept = kept;
+    return ASCC_OK;
+}
+
 ascc_status ascc_stage_sight(ascc_step_state *state)
 {
     const ascc_search_tools *tools = &state->tools;
@@ -159,8 +184,13 @@ ascc_status ascc_stage_sight(ascc_step_state *state)
                         .halo = state->halo,
                         .id = state->halo ? p->id : NULL};
     ascc_status status = find_areas(state);
+    if (status == ASCC_OK)
+        status = ascc_find_present(state);
     if (status != ASCC_OK)
         return status;
+    scene.row = state->sight.row;
+    scene.row_count = state->sight.row_count;
+    scene.far = state->sight.far;
     state->before_features = ascc_arena_mark_of(tools->arena);
     uint8_t *near = NULL;
     const bool room = ascc_near_walls(state, &near) && lend_features(state, near);
@@ -175,5 +205,7 @@ ascc_status ascc_stage_sight(ascc_step_state *state)
     ascc_arena_return(tools->arena, before_scene);
     if (status == ASCC_OK)
         status = take_shares(state);
+    if (status == ASCC_OK)
+        status = keep_values(state);
     return status == ASCC_OK ? take_idle(state) : status;
 }

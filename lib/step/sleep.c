@@ -20,10 +20,12 @@
 #define UNIT 65536.0
 #define FASTEST 1024.0 /* speeds beyond are cut to it */
 /* The mean velocity of a calm block, in limits: fluid that flows is not fluid that trembles. */
-#define DRIFT (1.0 / 3.0)
+#define DRIFT 0.75
+/* Of the mean velocity that support would have to give, in what gravity gives in a step. */
+#define LACK (1.0 / 3.0)
 /* Of the squares of speeds, above which a block wakes those around it; of one particle in it. */
 #define VIOLENT 2.25
-#define VIOLENT_ONE 16.0
+#define VIOLENT_ONE 64.0
 
 typedef struct block {
     uint32_t awake;  /* rows */
@@ -83,14 +85,16 @@ static void add_row(judgement *j, size_t i)
     b->disturbed |= p->rest[i] != j->code;
 }
 
-static void judge(block *b)
+/* drift: that a calm block may have. */
+static void judge(block *b, double drift_limit)
 {
     double drift = 0.0;
     for (int c = 0; c < 3; c++)
         drift += (double)b->mean[c] * (double)b->mean[c];
     const double whole = UNIT * (double)b->awake;
     /* A mean of few that tremble is not 0: its square is about theirs over their number. */
-    const double still = (DRIFT * DRIFT + 1.0 / fmax(1.0, (double)b->awake)) * whole * whole;
+    const double still =
+        (drift_limit * drift_limit + 1.0 / fmax(1.0, (double)b->awake)) * whole * whole;
     b->violent = b->disturbed || (b->awake && (b->fast || (double)b->square > VIOLENT * whole));
     b->restless = b->violent || (b->awake && ((double)b->square > whole || drift > still));
 }
@@ -162,7 +166,7 @@ static bool near(judgement *j, size_t number, bool (*is)(const block *b))
 
 /* ---- The judgement ---- */
 
-/* Steps that rows have been calm; those that wake begin with 0. */
+/* Steps that rows have been calm, of which half are forgotten where they are not; those that wake begin with 0. */
 static void count_calm(judgement *j)
 {
     const ascc_particles *p = j->state->particles;
@@ -174,9 +178,9 @@ static void count_calm(judgement *j)
         const block *b = &j->block[j->of[i]];
         const int32_t before = p->rest[i];
         if (!ascc_is_asleep(before))
-            j->rest[i] = b->restless ? 0 : before < j->calm ? before + 1 : j->calm;
+            j->rest[i] = b->restless ? before / 2 : before < j->calm ? before + 1 : j->calm;
         else
-            j->rest[i] = b->near_violent || b->awake ? 0 : before;
+            j->rest[i] = b->near_violent || b->restless ? 0 : before;
     }
     for (size_t i = 0; i < p->fluid_count; i++) {
         block *b = &j->block[j->of[i]];
@@ -270,13 +274,14 @@ static void decide(judgement *j, ascc_sleep *sleep, uint8_t *still, uint8_t *idl
         add_row(j, i);
     look_outside(j);
     for (size_t b = 0; b < j->blocks.count; b++)
-        judge(&j->block[b]);
+        judge(&j->block[b], DRIFT);
     count_calm(j);
     put_to_sleep(j);
     for (size_t i = 0; i < n; i++) {
         still[i] = ascc_is_asleep(j->rest[i]);
         idle[i] = still[i] && !j->block[j->of[i]].near_awake;
         sleep->count += still[i];
+        sleep->idle_count += idle[i];
     }
     if (sleep->count) {
         sleep->still = still;
@@ -327,7 +332,7 @@ static void wake_pushed(judgement *j, const ascc_sleep *sleep)
 {
     const size_t n = j->state->particles->fluid_count;
     for (size_t b = 0; b < j->blocks.count; b++)
-        judge(&j->block[b]);
+        judge(&j->block[b], LACK);
     for (size_t i = 0; i < n; i++)
         if (sleep->still[i] && !sleep->idle[i] && j->block[j->of[i]].restless)
             sleep->rest[i] = 0;

@@ -11,6 +11,7 @@
 
 #include "network/pair_sum.h"
 #include "points/particles.h"
+#include "present.h"
 #include "turn.h"
 #include "wall_volumes.h"
 
@@ -43,9 +44,18 @@ typedef struct ascc_advance {
     bool walls_move;
 } ascc_advance;
 
+/* What a step looks at. */
+typedef struct ascc_sight {
+    const uint32_t *row; /* [row_count] the host's rows of fluid, ascending; NULL = all */
+    size_t row_count;
+    const ascc_points *far; /* what the rest of the fluid is to coarser levels */
+    ascc_kept *kept;        /* values of an earlier step; NULL = none are kept */
+} ascc_sight;
+
 /* Fluid that sleeps, all in the host's order. */
 typedef struct ascc_sleep {
-    size_t count;         /* rows */
+    size_t count; /* rows */
+    size_t idle_count;
     const uint8_t *still; /* 1 = sleeps: stays where it is; NULL = none */
     const uint8_t *idle;  /* 1 = and so do all that could push it: nothing is computed for it */
     int32_t *rest;        /* what the particles' own become; NULL = they stay as they are */
@@ -104,6 +114,7 @@ typedef struct ascc_step_state {
     ascc_status (*engine)(struct ascc_step_state *state); /* engine.h */
     const struct ascc_trust *trust; /* what the step's input is measured by; NULL = it is not */
     ascc_wall_volumes *walls;       /* kept while they rest */
+    ascc_memory *memory;            /* kept while fluid rests; NULL = nothing is */
     ascc_search_tools tools;
     ascc_step_statistics *statistics; /* also the times of stages */
     double since;                     /* when the stage under way began, s */
@@ -120,6 +131,7 @@ typedef struct ascc_step_state {
     /* What stages make: */
     ascc_sleep sleep;
     ascc_advance advance;
+    ascc_sight sight;
     ascc_impulses impulses;
     float *fluid_features, *boundary_features; /* lent until the network has run */
     ascc_arena_mark before_features;
@@ -171,6 +183,17 @@ ascc_status ascc_stage_support(ascc_step_state *state);
 /* Marks the walls that fluid may see, in memory that the arena lends: *near stays NULL where it may see all, or where
  * finding out would not pay. False without memory. */
 bool ascc_near_walls(ascc_step_state *state, uint8_t **near);
+/* Which fluid has to be looked at: state->sight. errors: MEMORY. */
+ascc_status ascc_find_present(ascc_step_state *state);
+/* Row n of those that are looked at, of so many. */
+static inline size_t ascc_sight_count(const ascc_step_state *state)
+{
+    return state->sight.row ? state->sight.row_count : state->particles->fluid_count;
+}
+static inline size_t ascc_sight_row(const ascc_step_state *state, size_t n)
+{
+    return state->sight.row ? state->sight.row[n] : n;
+}
 /* Features, and the point sets of the scene (paper sections 3.3, 3.4). errors: MEMORY, RANGE. */
 ascc_status ascc_stage_sight(ascc_step_state *state);
 /* New momenta and positions. errors: RANGE, NOT_FINITE; the message names the particle. */

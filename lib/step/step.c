@@ -63,7 +63,9 @@ static ascc_status fill_step(ascc_step *step, const ascc_step_options *o, ascc_m
         ascc_network_look_at(&step->network, model->trust.layer);
     const size_t keys = (size_t)step->network.key_count;
     step->expected = ascc_allocate(&context->allocator, keys, sizeof *step->expected);
-    if (!step->expected) {
+    if (!step->expected || !ascc_memory_open(&step->memory, &step->network)) {
+        if (step->expected)
+            ascc_release(&context->allocator, step->expected, keys, sizeof *step->expected);
         ascc_network_destroy(&step->network);
         return ascc_fail(message, ASCC_ERROR_MEMORY, "no memory for a step");
     }
@@ -124,6 +126,7 @@ void ascc_step_destroy(ascc_step **step)
                  sizeof *s->expected);
     ascc_arena_close(&s->arena);
     ascc_wall_volumes_close(&s->walls);
+    ascc_memory_close(&s->memory);
     ascc_network_destroy(&s->network);
     ascc_model_release(s->model);
     s->magic = 0;
@@ -300,6 +303,7 @@ ascc_status ascc_step_once(ascc_step *step, ascc_particles *p, const ascc_motion
         .looks = step->looks,
         .detail = step->detail,
         .walls = &step->walls,
+        .memory = &step->memory,
         .tools = {arena, step->context->workers, &step->context->kernels, &step->message},
         .statistics = &step->statistics,
         .since = ascc_clock()};

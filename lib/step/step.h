@@ -21,6 +21,7 @@ struct ascc_step {
     ascc_engine engine;
     ascc_arena arena;
     ascc_wall_volumes walls;
+    ascc_memory memory;   /* of what it saw */
     double *acceleration; /* the host's, [fluid][dimension] */
     size_t acceleration_capacity;
     unsigned char *kept; /* the state before the first of several substeps */
