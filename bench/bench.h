@@ -20,5 +20,6 @@ void bench_scale(const bench_options *options);
 void bench_load(const bench_options *options);
 void bench_train(const bench_options *options);
 void bench_bodies(const bench_options *options);
+void bench_pool(const bench_options *options);
 
 #endif

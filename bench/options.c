@@ -8,7 +8,7 @@
 #include "kernels/kernels.h"
 
 const char bench_usage[] =
-    "usage: bench kernel|step|threads|scale|roofline|load|train|bodies|all [options]\n"
+    "usage: bench kernel|step|threads|scale|roofline|load|train|bodies|pool|all [options]\n"
     "  --quick             smaller scenes, fewer repeats\n"
     "  --only TEXT         kernels whose names hold the text\n"
     "  --scene NAME        block, dam-break, still-column, droplets, free-fall or a sequence file\n"

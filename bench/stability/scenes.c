@@ -498,7 +498,7 @@ const stability_scene stability_scenes[] = {
     {"pool with a drop",
      "a drop falls on a pool of which some fell asleep in half of the frames: nothing faster by a "
      "tenth than "
-     "where none may sleep, no escape, no pair in 1,000 below spacing / 5",
+     "in the same pool awake, no escape, no pair in 1,000 below spacing / 5",
      200, 400, stability_pool_with_a_drop},
     {"budget",
      "a dam breaks, in the middle third of the frames with half of what they may cost, pbf below: "
