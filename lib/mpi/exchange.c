@@ -54,19 +54,31 @@ void ascc_mpi_open(ascc_mpi_particles *set)
     set->message.text[0] = '\0';
 }
 
-ascc_status ascc_mpi_agree(ascc_mpi_particles *set, ascc_status own)
+ascc_status ascc_mpi_agree_on(ascc_mpi_particles *set, ascc_status own, uint64_t *largest,
+                              size_t count)
 {
-    int failed = own != ASCC_OK;
+    uint64_t words[1 + ASCC_MPI_NUMBERS] = {own != ASCC_OK}; /* of whatever call: all are alike */
+    assert(count <= ASCC_MPI_NUMBERS);
     if (set->stopped)
         return own != ASCC_OK ? own : ASCC_ERROR_MISMATCH;
-    ascc_mpi_reduce(set, &failed, 1, MPI_INT, MPI_MAX);
-    if (!failed)
+    if (own == ASCC_OK && count)
+        memcpy(words + 1, largest, count * sizeof *largest);
+    ascc_mpi_reduce(set, words, 1 + ASCC_MPI_NUMBERS, MPI_UINT64_T, MPI_MAX);
+    if (!words[0]) {
+        if (count)
+            memcpy(largest, words + 1, count * sizeof *largest);
         return ASCC_OK;
+    }
     set->stopped = true;
     set->by_other = own == ASCC_OK;
     if (set->by_other && set->step)
         ascc_fail(&set->step->message, ASCC_ERROR_MISMATCH, "another process failed");
     return own != ASCC_OK ? own : ASCC_ERROR_MISMATCH;
+}
+
+ascc_status ascc_mpi_agree(ascc_mpi_particles *set, ascc_status own)
+{
+    return ascc_mpi_agree_on(set, own, NULL, 0);
 }
 
 ascc_status ascc_mpi_conclude(ascc_mpi_particles *set, ascc_status own, const char *text)

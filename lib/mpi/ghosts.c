@@ -124,10 +124,11 @@ static bool is_other_fluid(const ascc_mpi_particles *set)
 }
 
 /* Everybody has the loads of all, cuts the curve alike where it does not balance, and knows where fluid is. */
-static ascc_status look(ascc_mpi_particles *set, bool anew)
+static ascc_status look(ascc_mpi_particles *set, bool room, bool anew)
 {
     size_t count = 0, all;
-    ascc_status status = ascc_mpi_agree(set, find_loads(set, &count) ? ASCC_OK : no_memory(set));
+    room = room && find_loads(set, &count);
+    ascc_status status = ascc_mpi_agree(set, room ? ASCC_OK : no_memory(set));
     if (status == ASCC_OK)
         status = ascc_mpi_share(set, set->loads.at, count, sizeof(ascc_load), &all);
     if (status != ASCC_OK)
@@ -148,7 +149,7 @@ static ascc_status look(ascc_mpi_particles *set, bool anew)
     return status;
 }
 
-static ascc_status balance(ascc_mpi_particles *set)
+static ascc_status balance(ascc_mpi_particles *set, bool room)
 {
     const bool anew = !set->cut || is_other_fluid(set);
     if (!anew && ++set->age < LOOK)
@@ -157,7 +158,7 @@ static ascc_status balance(ascc_mpi_particles *set)
     set->total = set->halo.total;
     set->halo.reached = fmax(ASCC_MPI_SPARE * set->farthest, ASCC_MPI_NEAR * set->local->spacing);
     set->farthest = 0.0;
-    return look(set, anew);
+    return look(set, room, anew);
 }
 
 /* ---- Owners ---- */
@@ -170,13 +171,13 @@ static bool add_pair(ascc_mpi_particles *set, size_t *count, int rank, size_t ro
     return true;
 }
 
-/* Packs the rows of lists, and sends them. */
+/* Packs the rows of lists, and sends them. room: for all before this; largest: two numbers to agree on. */
 static ascc_status send_rows(ascc_mpi_particles *set, const ascc_mpi_lists *lists, bool room,
-                             size_t *received)
+                             uint64_t largest[2], size_t *received)
 {
     const size_t ranks = (size_t)set->size, size = ascc_mpi_row_size(set);
     room = room && ascc_mpi_room(set, &set->outgoing, lists->start[ranks] * size, 1);
-    const ascc_status status = ascc_mpi_agree(set, room ? ASCC_OK : no_memory(set));
+    const ascc_status status = ascc_mpi_agree_on(set, room ? ASCC_OK : no_memory(set), largest, 2);
     if (status != ASCC_OK)
         return status;
     const uint32_t *row = lists->row.at;
@@ -187,15 +188,18 @@ static ascc_status send_rows(ascc_mpi_particles *set, const ascc_mpi_lists *list
     return ascc_mpi_swap(set, size, received);
 }
 
-ascc_status ascc_mpi_settle(ascc_mpi_particles *set)
+/* Fluid goes to whoever owns the block it is in; the curve is cut anew where that does not balance. room: for all
+ * before this. */
+static ascc_status settle(ascc_mpi_particles *set, bool room)
 {
     const size_t rows = set->local->fluid_count;
     ascc_mpi_lists *leaving = &set->ghosts[0].send;
+    uint64_t nothing[2] = {0, 0};
     size_t count = 0, received;
-    ascc_status status = balance(set);
+    ascc_status status = balance(set, room);
     if (status != ASCC_OK)
         return status;
-    bool room = ascc_mpi_room(set, &set->flags, rows + 1, 1);
+    room = room && ascc_mpi_room(set, &set->flags, rows + 1, 1);
     uint8_t *leaves = set->flags.at;
     int owner = 0;
     int64_t block[3], last[3] = {INT64_MAX, 0, 0};
@@ -211,12 +215,12 @@ ascc_status ascc_mpi_settle(ascc_mpi_particles *set)
             room = add_pair(set, &count, owner, i);
     }
     room = room && ascc_mpi_sort_pairs(set, set->pairs.at, count, leaving);
-    status = send_rows(set, leaving, room, &received);
+    status = send_rows(set, leaving, room, nothing, &received);
     if (status != ASCC_OK)
         return status;
     status =
         ascc_mpi_agree(set, ascc_mpi_rows_reserve(set, rows + received) ? ASCC_OK : no_memory(set));
-    if (status != ASCC_OK)
+    if (status != ASCC_OK) /* nobody has let go of anything */
         return status;
     if (count)
         ascc_mpi_drop_rows(set, leaves);
@@ -227,19 +231,17 @@ ascc_status ascc_mpi_settle(ascc_mpi_particles *set)
 
 /* ---- Ghosts ---- */
 
-/* Whether all fluid has one mass. */
-static void compare_masses(ascc_mpi_particles *set)
+/* Of all fluid: bits of the greatest mass, and of the smallest, turned over. */
+static void find_masses(const ascc_mpi_particles *set, uint64_t most[2])
 {
     const ascc_particles *p = set->local;
-    uint64_t most[2] = {0, 0};
+    most[0] = most[1] = 0;
     for (size_t i = 0; i < p->fluid_count; i++) {
         uint64_t bits;
         memcpy(&bits, &p->mass[i], sizeof bits);
         most[0] = bits > most[0] ? bits : most[0];
         most[1] = ~bits > most[1] ? ~bits : most[1];
     }
-    ascc_mpi_reduce(set, most, 2, MPI_UINT64_T, MPI_MAX);
-    set->halo.uniform = most[0] == ~most[1];
 }
 
 /* What goes to whom. */
@@ -267,9 +269,8 @@ static ascc_status take_ghosts(ascc_mpi_particles *set, size_t received)
     const bool room = ascc_mpi_rows_reserve(set, own + received) &&
                       ascc_mpi_room(set, &set->flags, own + received + 1, 1) &&
                       ascc_mpi_room(set, &from->row, received, sizeof(uint32_t));
-    const ascc_status status = ascc_mpi_agree(set, room ? ASCC_OK : no_memory(set));
-    if (status != ASCC_OK)
-        return status;
+    if (!room)
+        return ascc_mpi_agree(set, no_memory(set));
     from->start[0] = 0;
     for (size_t r = 0; r < ranks; r++)
         from->start[r + 1] = from->start[r] + set->counts[ranks + r];
@@ -305,6 +306,7 @@ ascc_status ascc_mpi_ghosts_begin(ascc_halo *halo, struct ascc_step *step,
                                   ascc_particles *particles, ascc_motion *motion)
 {
     ascc_mpi_particles *set = ascc_mpi_of_halo(halo);
+    uint64_t most[2]; /* of masses */
     size_t received;
     (void)particles;
     set->step = step;
@@ -313,14 +315,13 @@ ascc_status ascc_mpi_ghosts_begin(ascc_halo *halo, struct ascc_step *step,
     halo->own = set->local->fluid_count;
     foresee(set);
     find_reach(set);
-    ascc_status status = ascc_mpi_agree(set, rest_accelerations(set) ? ASCC_OK : no_memory(set));
-    if (status == ASCC_OK)
-        status = ascc_mpi_settle(set);
+    ascc_status status = settle(set, rest_accelerations(set));
     if (status != ASCC_OK)
         return status;
     halo->own = set->local->fluid_count;
-    compare_masses(set);
-    status = send_rows(set, &set->ghosts[0].send, list_ghosts(set), &received);
+    find_masses(set, most);
+    status = send_rows(set, &set->ghosts[0].send, list_ghosts(set), most, &received);
+    set->halo.uniform = most[0] == ~most[1];
     if (status == ASCC_OK)
         status = take_ghosts(set, received);
     motion->acceleration = set->accelerates ? step->acceleration : NULL;

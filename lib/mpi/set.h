@@ -76,8 +76,9 @@ struct ascc_mpi_particles {
     ascc_message message;
 };
 
-#define ASCC_MPI_ALIKE 24 /* words that ascc_mpi_alike compares, at most */
-#define ASCC_MPI_EDGE 8.0 /* of a block, spacings */
+#define ASCC_MPI_NUMBERS 2 /* that ascc_mpi_agree_on takes, at most */
+#define ASCC_MPI_ALIKE 24  /* words that ascc_mpi_alike compares, at most */
+#define ASCC_MPI_EDGE 8.0  /* of a block, spacings */
 /* Ghosts serve so far, spacings, and by this factor farther than fluid has gone. */
 #define ASCC_MPI_NEAR 0.5
 #define ASCC_MPI_SPARE 1.25
@@ -113,6 +114,9 @@ void ascc_mpi_open(ascc_mpi_particles *set);
 
 /* OK where all are. */
 ascc_status ascc_mpi_agree(ascc_mpi_particles *set, ascc_status own);
+/* The same, and the largest of some numbers of all. */
+ascc_status ascc_mpi_agree_on(ascc_mpi_particles *set, ascc_status own, uint64_t *largest,
+                              size_t count);
 /* The same, of a call that is no step: a failure is told to all, with the process that failed. */
 ascc_status ascc_mpi_conclude(ascc_mpi_particles *set, ascc_status own, const char *text);
 /* Pairs in any order become lists by process; within one the order stays. */
@@ -145,8 +149,6 @@ void ascc_mpi_merge_rows(ascc_mpi_particles *set, const unsigned char *bytes, si
 
 /* ---- ghosts.c ---- */
 
-/* Fluid goes to whoever owns the block it is in; the curve is cut anew where that does not balance. */
-ascc_status ascc_mpi_settle(ascc_mpi_particles *set);
 ascc_status ascc_mpi_ghosts_begin(ascc_halo *halo, struct ascc_step *step,
                                   ascc_particles *particles, ascc_motion *motion);
 void ascc_mpi_ghosts_end(ascc_halo *halo, ascc_particles *particles);

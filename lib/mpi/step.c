@@ -42,23 +42,18 @@ static void take_back(ascc_halo *halo, ascc_particles *particles)
     (void)ascc_particles_restore(particles, set->kept.at, set->kept_size);
 }
 
-static ascc_status reduce(ascc_halo *halo, uint64_t *numbers, size_t count, MPI_Op op)
-{
-    ascc_mpi_particles *set = ascc_mpi_of_halo(halo);
-    const ascc_status status = ascc_mpi_agree(set, count <= INT32_MAX ? ASCC_OK : ASCC_ERROR_RANGE);
-    if (status == ASCC_OK)
-        ascc_mpi_reduce(set, numbers, count, MPI_UINT64_T, op);
-    return status;
-}
-
 static ascc_status largest(ascc_halo *halo, uint64_t *numbers, size_t count)
 {
-    return reduce(halo, numbers, count, MPI_MAX);
+    return ascc_mpi_agree_on(ascc_mpi_of_halo(halo), ASCC_OK, numbers, count);
 }
 
 static ascc_status sum(ascc_halo *halo, uint64_t *numbers, size_t count)
 {
-    return reduce(halo, numbers, count, MPI_SUM);
+    ascc_mpi_particles *set = ascc_mpi_of_halo(halo);
+    const ascc_status status = ascc_mpi_agree(set, count <= INT32_MAX ? ASCC_OK : ASCC_ERROR_RANGE);
+    if (status == ASCC_OK)
+        ascc_mpi_reduce(set, numbers, count, MPI_UINT64_T, MPI_SUM);
+    return status;
 }
 
 static ascc_status join(ascc_halo *halo, uint64_t *numbers, size_t most, size_t *count,

@@ -70,7 +70,7 @@ struct ascc_halo {
      * samples; which are its own. unit: m of a unit. errors: MEMORY. */
     ascc_status (*corners)(ascc_halo *halo, int level, double unit, const ascc_search_tools *tools,
                            ascc_points *samples, const uint8_t **own);
-    /* Over all processes: the largest of numbers, and sums that wrap. errors: those of any process. */
+    /* Over all processes: the largest of one or two numbers, and sums that wrap. errors: those of any process. */
     ascc_status (*largest)(ascc_halo *halo, uint64_t *numbers, size_t count);
     ascc_status (*sum)(ascc_halo *halo, uint64_t *numbers, size_t count);
     /* The numbers of all processes one after another, where they are at most `most`, and where those of this one
@@ -79,13 +79,13 @@ struct ascc_halo {
                         size_t *first);
 };
 
-/* The largest of a number >= 0 over all processes: their bits are in the order of the numbers. */
-static inline ascc_status ascc_halo_largest(ascc_halo *halo, double *number)
+/* The largest of one or two numbers >= 0 over all processes: their bits are in the order of the numbers. */
+static inline ascc_status ascc_halo_largest(ascc_halo *halo, double *number, size_t count)
 {
-    uint64_t bits;
-    memcpy(&bits, number, sizeof bits);
-    const ascc_status status = halo->largest(halo, &bits, 1);
-    memcpy(number, &bits, sizeof bits);
+    uint64_t bits[2];
+    memcpy(bits, number, count * sizeof *bits);
+    const ascc_status status = halo->largest(halo, bits, count);
+    memcpy(number, bits, count * sizeof *bits);
     return status;
 }
 

@@ -99,7 +99,7 @@ static ascc_status find_heaviest(const ascc_smoothing *s, double *heaviest)
     *heaviest = 0.0;
     for (size_t i = 0; i < (s->sum->uniform && s->count ? 1 : s->count); i++)
         *heaviest = s->sum->mass[i] > *heaviest ? s->sum->mass[i] : *heaviest;
-    return halo && !s->sum->uniform ? ascc_halo_largest(halo, heaviest) : ASCC_OK;
+    return halo && !s->sum->uniform ? ascc_halo_largest(halo, heaviest, 1) : ASCC_OK;
 }
 
 static void velocity_rows(void *data, size_t begin, size_t end, int32_t slot)

@@ -114,7 +114,7 @@ ascc_status ascc_speed_in_company(ascc_context *context, const ascc_particles *p
         if (near >> n & 1)
             found = fmax(found, job.fast[n][WORDS - 1]);
     if (halo)
-        status = ascc_halo_largest(halo, &found);
+        status = ascc_halo_largest(halo, &found, 1);
     if (status == ASCC_OK)
         *speed = found;
     return status;

@@ -66,7 +66,7 @@ static ascc_status check_reached(const ascc_step_state *state, const double *flu
     for (size_t i = 0; i < seen->count; i++)
         for (size_t c = 0; c < d && !ascc_hierarchy_is_idle(h, i); c++)
             farthest = fmax(farthest, fabs(fluid[i * d + c] - unit * (double)seen->position[c][i]));
-    const ascc_status status = ascc_halo_largest(state->halo, &farthest);
+    const ascc_status status = ascc_halo_largest(state->halo, &farthest, 1);
     if (status != ASCC_OK || state->halo->serve(state->halo, farthest))
         return status;
     return ascc_fail(state->tools.message, ASCC_ERROR_LIMIT, "ghosts do not reach so far");

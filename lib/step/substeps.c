@@ -114,13 +114,6 @@ static ascc_status find_speed_that_counts(const ascc_step *step, const ascc_part
                                  fastest);
 }
 
-/* Of the fluid of all processes. */
-static ascc_status join_extremes(ascc_halo *halo, double *speed, double *push)
-{
-    const ascc_status status = ascc_halo_largest(halo, speed);
-    return status == ASCC_OK ? ascc_halo_largest(halo, push) : status;
-}
-
 ascc_status ascc_count_substeps(ascc_step *step, const ascc_particles *p, const ascc_motion *motion,
                                 int32_t *count)
 {
@@ -133,9 +126,10 @@ ascc_status ascc_count_substeps(ascc_step *step, const ascc_particles *p, const 
         return ASCC_OK;
     ascc_workers_run(step->context->workers, p->fluid_count, 8192, look_at_fluid, &job);
     ascc_workers_run(step->context->workers, p->boundary_count, 8192, look_at_walls, &job);
-    double speed = root_of(&job.speed), pushed = root_of(&job.push);
-    ascc_status status = step->halo ? join_extremes(step->halo, &speed, &pushed) : ASCC_OK;
-    const double push = sqrt(square_of(motion->gravity, 3)) + pushed;
+    double extremes[2] = {root_of(&job.speed), root_of(&job.push)};
+    ascc_status status = step->halo ? ascc_halo_largest(step->halo, extremes, 2) : ASCC_OK;
+    double speed = extremes[0];
+    const double push = sqrt(square_of(motion->gravity, 3)) + extremes[1];
     const double gravity = push * dt * dt / h;
     if (status == ASCC_OK)
         status = find_speed_that_counts(step, p, push, &speed);
