@@ -254,7 +254,6 @@ typedef struct faucet {
     ascc_particles *particles;
     ascc_tap tap;
     double nearest; /* pair so far, spacings */
-    long crowded;   /* frames with one below spacing / 5 */
 } faucet;
 
 enum { MOST_PLACES = 64 };
@@ -311,17 +310,6 @@ static double inner_density(const simulation *s)
     return cell_density_between(s, low, high);
 }
 
-/* DFSPH, which the networks learnt from, has a pair below a fifth of a spacing in 24 of 500 frames, the nearest at 0.083. */
-static bool keeps_spacing(cell *c, const simulation *s, faucet *f)
-{
-    const double nearest = cell_nearest_pair(s) / SPACING;
-    f->nearest = fmin(f->nearest, nearest);
-    f->crowded += !(nearest >= 0.2);
-    return f->crowded <= c->frames / 20 ||
-           cell_fail(c, "%ld frames with a pair below spacing / 5, nearest %.2g spacings",
-                     f->crowded, f->nearest);
-}
-
 /* That of a tank, mean over the last tenth of the frames; what comes in on the way is let in. */
 static double tank_density(cell *c, world *w, faucet *f)
 {
@@ -332,7 +320,10 @@ static double tank_density(cell *c, world *w, faucet *f)
     while (good && cell_step(c, &s)) {
         const double due = f ? f->tap.rate * w->scene.time_step * (double)s.frame : 0.0;
         good = cell_nothing_escapes(c, &s);
-        good = good && (!f || keeps_spacing(c, &s, f));
+        if (f)
+            f->nearest = fmin(f->nearest, cell_nearest_pair(&s) / SPACING);
+        if (good && f && !(f->nearest >= 0.2))
+            good = cell_fail(c, "nearest pair %.2g spacings", f->nearest);
         if (good && !(fabs((double)(w->scene.fluid_count - first) - due) < 1.0 + 1e-6))
             good = cell_fail(c, "%zu came, of %.0f", w->scene.fluid_count - first, due);
         if (s.frame > c->frames - c->frames / 10)

@@ -483,8 +483,8 @@ const stability_scene stability_scenes[] = {
      "the box",
      40, 200, stability_turned_tank},
     {"tap",
-     "fluid falls into a tank: no escape; as many as the rate says; a pair nearer than spacing / 5 "
-     "in at most one frame of 20, which is what DFSPH keeps; "
+     "fluid falls into a tank: no escape; as many as the rate says; no pair ever nearer than "
+     "spacing / 5; "
      "in the end mean density within 3 % of that of as much fluid that was there from the "
      "beginning, "
      "away from walls and surface",
