@@ -16,6 +16,8 @@
 
 /* How long blocks must be calm, s. */
 #define CALM 0.5
+/* The share of it after which what comes among fluid that sleeps does so, too: longer than anything falls as slowly. */
+#define JOINS 0.25
 /* Sums of a block are integers: speeds, in shares of the limit, times 2^16; squares of these over 2^16. */
 #define UNIT 65536.0
 #define FASTEST 1024.0 /* speeds beyond are cut to it */
@@ -181,6 +183,8 @@ static void count_calm(judgement *j)
             j->rest[i] = b->restless ? before / 2 : before < j->calm ? before + 1 : j->calm;
         else
             j->rest[i] = b->near_violent || b->restless ? 0 : before;
+        if (b->asleep && !b->near_violent && !b->restless && j->rest[i] > JOINS * j->calm)
+            j->rest[i] = j->code;
     }
     for (size_t i = 0; i < p->fluid_count; i++) {
         block *b = &j->block[j->of[i]];
