@@ -88,7 +88,7 @@ static int close_all(void **state)
 
 typedef struct shadow_row {
     uint64_t id;
-    double position[3], mass, normal[3];
+    double position[3], mass, detail, normal[3];
     int32_t body;
 } shadow_row;
 
@@ -252,6 +252,7 @@ static void add_fluid(sequence *s)
             (void)put(&v, i, c, d, some_velocity(s));
         }
         row->mass = mass ? put(&m, i, 0, 1, some_mass(s)) : 0.125;
+        row->detail = 0.0;
     }
     if (n > 1 && once_in(s, 8)) /* two at one place */
         for (size_t c = 0; c < d; c++)
@@ -613,8 +614,9 @@ static void set_some(sequence *s)
     static host_array h;
     const size_t count = s->count[ASCC_FLUID], first = below(s, count + 1);
     const size_t n = below(s, count - first + 1), d = s->width;
-    const ascc_field field = (ascc_field)below(s, 3);
-    const size_t components = field == ASCC_MASS ? 1 : d;
+    static const ascc_field fields[] = {ASCC_POSITION, ASCC_VELOCITY, ASCC_MASS, ASCC_DETAIL};
+    const ascc_field field = fields[below(s, 4)];
+    const size_t components = field == ASCC_MASS || field == ASCC_DETAIL ? 1 : d;
     lay_out(s, &h, n, components);
     for (size_t i = 0; i < n; i++) {
         shadow_row *row = &s->row[ASCC_FLUID][first + i];
@@ -623,8 +625,10 @@ static void set_some(sequence *s)
                 row->position[c] = put(&h, i, c, components, some_position(s));
             else if (field == ASCC_VELOCITY)
                 (void)put(&h, i, c, components, some_velocity(s));
-            else
+            else if (field == ASCC_MASS)
                 row->mass = put(&h, i, c, components, some_mass(s));
+            else
+                row->detail = put(&h, i, c, components, between(s, 0.0, 1.0));
     }
     CHECK(ascc_particles_set(s->particles, ASCC_FLUID, field, first, n, &h.from) == ASCC_OK);
 }
@@ -747,6 +751,7 @@ static void check_emitted(sequence *s, const ascc_tap *tap, size_t first, size_t
         shadow_row *row = &s->row[ASCC_FLUID][i];
         const ascc_array x = {.data = row->position, .scalar = ASCC_DOUBLE};
         row->mass = tap->mass > 0.0 ? tap->mass : 0.125;
+        row->detail = 0.0;
         CHECK(ascc_particles_get(s->particles, ASCC_FLUID, ASCC_POSITION, i, 1, &x) == ASCC_OK);
         for (size_t j = 0; j < first; j++) {
             double square = 0.0;
@@ -1021,7 +1026,10 @@ static ascc_particles *reversed_twin(sequence *s, ascc_context *context, bool *s
         const ascc_array read = {.data = velocity, .scalar = ASCC_DOUBLE};
         CHECK(ascc_particles_get(s->particles, ASCC_FLUID, ASCC_VELOCITY, n - 1, 1, &read) ==
               ASCC_OK);
+        const ascc_const_array detail = {.data = &row->detail, .scalar = ASCC_DOUBLE};
         CHECK(ascc_particles_add_fluid(twin, 1, &x, &v, &m, NULL) == ASCC_OK);
+        CHECK(ascc_particles_set(twin, ASCC_FLUID, ASCC_DETAIL, s->count[ASCC_FLUID] - n, 1,
+                                 &detail) == ASCC_OK);
         CHECK(ascc_particles_get_momentum(s->particles, n - 1, 1, given) == ASCC_OK);
         CHECK(ascc_particles_get_momentum(twin, s->count[ASCC_FLUID] - n, 1, held) == ASCC_OK);
         *same = *same && memcmp(given, held, s->width * sizeof *given) == 0;
@@ -1134,12 +1142,14 @@ static void check_ids(sequence *s, int kind)
 static void check_field(sequence *s, ascc_kind kind, ascc_field field)
 {
     static host_array h;
-    const size_t count = s->count[kind], components = field == ASCC_MASS ? 1 : s->width;
+    const bool single = field == ASCC_MASS || field == ASCC_DETAIL;
+    const size_t count = s->count[kind], components = single ? 1 : s->width;
     lay_out(s, &h, count, components);
     CHECK(ascc_particles_get(s->particles, kind, field, 0, count, &h.to) == ASCC_OK);
     for (size_t i = 0; i < count; i++) {
         const shadow_row *row = &s->row[kind][i];
         const double *held = field == ASCC_MASS     ? &row->mass
+                             : field == ASCC_DETAIL ? &row->detail
                              : field == ASCC_NORMAL ? row->normal
                                                     : row->position;
         for (size_t c = 0; c < components; c++) {
@@ -1158,6 +1168,7 @@ static void check_all(sequence *s)
     check_bodies(s);
     check_field(s, ASCC_FLUID, ASCC_POSITION);
     check_field(s, ASCC_FLUID, ASCC_MASS);
+    check_field(s, ASCC_FLUID, ASCC_DETAIL);
     check_field(s, ASCC_BOUNDARY, ASCC_POSITION);
     check_field(s, ASCC_BOUNDARY, ASCC_NORMAL);
     CHECK(ascc_particles_get_bodies(s->particles, 0, s->count[ASCC_BOUNDARY], bodies) == ASCC_OK);
