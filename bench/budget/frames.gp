@@ -5,9 +5,10 @@ set datafile separator ","
 set grid lc rgb "#dddddd"
 set output ARG1."/budget-frames.svg"
 set terminal svg size 900,640 font "sans-serif,13" background "white"
-set multiplot layout 2,1 title "20,000 particles at rest, 4,913 more from frame 60 to 180 and from 240: pbf3d, water3d, water3d-large within 190 ms"
+set multiplot layout 2,1 title "19,652 particles at rest, 4,913 more from frame 60 to 180 and from 240, within 190 ms a step"
+set lmargin 9
 set xrange [0:360]
-set yrange [0:*]
+set yrange [0:400]
 set ylabel "CPU time of a step, ms"
 set xlabel ""
 set key top left horizontal
@@ -19,5 +20,6 @@ plot frames using 1:9 every ::1 with lines lc rgb "#c8c8c8" title "all by water3
 set ylabel "Chamfer distance between both, mm"
 set xlabel "frame of 0.02 s"
 set key off
+set yrange [0:*]
 plot frames using 1:($8 * 1e3) every ::1 with linespoints pt 7 ps 0.3 lc rgb "#444444"
 unset multiplot

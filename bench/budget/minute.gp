@@ -9,7 +9,9 @@ set output ARG1."/budget.svg"
 set title "A minute of a pool that takes water and loses it: cost, and distance to all of it by water3d-large"
 set xlabel "CPU time of a step of 0.02 s, ms, in the mean (one thread)"
 set ylabel "Chamfer distance to that run, mm, in the mean"
-set xrange [0:*]
+set logscale x
+set xtics (0.5, 1, 2, 5, 10)
+set xrange [0.5:20]
 set yrange [-2:*]
 set key bottom left
 # Fixed models are squares, ladders circles; filled: parts may sleep.
@@ -18,4 +20,5 @@ plot for [s = 0:1] of(0, s) using 3:($4 * 1e3) with points pt (s ? 5 : 4) ps 1.4
         title (s ? "one model, sleeping" : "one model"), \
     for [s = 0:1] of(1, s) using 3:($4 * 1e3) with points pt (s ? 7 : 6) ps 1.4 lc rgb "#c0392b" \
         title (s ? "ladder with a budget, sleeping" : "ladder with a budget"), \
-    for [l = 0:1] for [s = 0:1] of(l, s) using 3:($4 * 1e3):1 with labels offset 0,(s ? -1 : 1) font ",10" notitle
+    for [l = 0:1] for [s = 0:1] of(l, s) using 3:($4 * 1e3):1 with labels left offset 1,(s ? -0.4 : 0.4) \
+        font ",10" notitle

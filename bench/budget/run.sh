@@ -40,7 +40,7 @@ measure_minute() {
         minute $model $model 0.5 --like "$scratch/places"
     done
     minute water3d-large water3d-large 0.5 --like "$scratch/places"
-    for budget in 5 12; do
+    for budget in 6 12; do
         minute "$budget ms" $rungs 0 --budget $budget --like "$scratch/places"
         minute "$budget ms" $rungs 0.5 --budget $budget --like "$scratch/places"
     done
