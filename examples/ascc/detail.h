@@ -7,12 +7,13 @@
 #include <stdint.h>
 
 enum { ASCC_DETAIL_WISHES = 16 };
+enum { ASCC_DETAIL_NEAR = 0, ASCC_DETAIL_FAST = 1, ASCC_DETAIL_SURFACE = 2 };
 
 /** The largest of what each asks for. */
 typedef struct ascc_detail {
     size_t count;
     struct {
-        enum { ASCC_DETAIL_NEAR, ASCC_DETAIL_FAST, ASCC_DETAIL_SURFACE } kind;
+        int kind;         /* ASCC_DETAIL_NEAR, ... */
         double number[4]; /* a place and a radius, m; a speed, m/s; a depth, m */
     } wish[ASCC_DETAIL_WISHES];
 } ascc_detail;
