@@ -344,7 +344,7 @@ TABLE2 = """## Table 2: what each part is worth
 
 From the highest score to the lowest: {order}. `examples/train/ablation2d.json`, changed row by row, equally many iterations, on the sequences of Table 1; errors on the two given test sequences; ± over the seeds. "Steps until it fails": mean of the rollouts that do, to the end of those
 sequences. The paper's overall score is the harmonic mean of normalised RMSE, EMD and momentum scores, the full network 1. How it normalises is not said; here an error's score is the mean error of the full networks over the network's own, and momentum's 1 / (1 + error), so
-that 0 gives 1 and an error as large as the momentum 1/2; a network whose rollout did not reach the end has no EMD and no score. What differs: two-dimensional, networks of 8 to 24 channels, without limit or contact, training of a minute.
+that 0 gives 1 and an error as large as the momentum 1/2; a network whose rollout did not reach the end has no EMD and no score. What differs: two-dimensional, networks of 8 to 24 channels, without limit or contact, trained for less than a minute.
 {remark}"""
 
 SPEED = """## Section 5.4: speed
@@ -353,7 +353,7 @@ SPEED = """## Section 5.4: speed
 
 One thread, CPU time of one step of `bench step --scene block` (no walls); a frame is the model's time step, {frame}. MiB is the scratch of a step. The last column is CPU time of the
 reference SPH of `examples/reference` for a frame of 0.02 s in steps of 1e-4 s ({sph}) over that of the network, per particle, same machine. DualSPHysics 5.4 itself took 203 us a particle and frame at that step in 2D (10,000 particles),
-{dual}. The paper compares a graphics card with one CPU thread; these are one CPU thread both. Time does not depend on how long a network was trained. Farthest points cost the square of the particles: a million would take PointNet++ hours, and it is not asked for them.
+{dual}. The paper compares a graphics card with one CPU thread; these are one CPU thread both. Time does not depend on how long a network was trained. Farthest points cost the square of the particles: a step of a million would take PointNet++ minutes, and it is not asked for one.
 {remark}"""
 
 
