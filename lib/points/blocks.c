@@ -20,6 +20,16 @@ void ascc_blocks_open(ascc_blocks *blocks, int64_t (*at)[3], uint32_t *slot, siz
     memset(slot, 0, slots * sizeof *slot);
 }
 
+bool ascc_blocks_lend(ascc_blocks *blocks, ascc_arena *arena, size_t most)
+{
+    const size_t slots = ascc_blocks_slots(most);
+    int64_t(*at)[3] = ascc_arena_lend(arena, most, sizeof *at);
+    uint32_t *slot = ascc_arena_lend(arena, slots, sizeof *slot);
+    if (at && slot)
+        ascc_blocks_open(blocks, at, slot, slots);
+    return at && slot;
+}
+
 void ascc_block_of(const double *place, int32_t dimension, double edge, int64_t at[3])
 {
     for (int32_t c = 0; c < 3; c++) /* what is farther than integers reach is cut */

@@ -4,6 +4,7 @@
 #define ASCC_BLOCKS_H
 
 #include "base/common.h"
+#include "base/memory.h"
 
 #define ASCC_NO_BLOCK UINT32_MAX
 
@@ -19,6 +20,9 @@ size_t ascc_blocks_slots(size_t most);
 
 /* An empty table in the caller's memory: room for `most` coordinates, and the slots that these need. */
 void ascc_blocks_open(ascc_blocks *blocks, int64_t (*at)[3], uint32_t *slot, size_t slots);
+
+/* An empty table for at most so many in an arena, lent; false without memory. */
+bool ascc_blocks_lend(ascc_blocks *blocks, ascc_arena *arena, size_t most);
 
 /* The block of a place; edge: of a block. [2] is 0 in 2D. */
 void ascc_block_of(const double *place, int32_t dimension, double edge, int64_t at[3]);

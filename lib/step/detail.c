@@ -207,25 +207,14 @@ static bool open_state(const ascc_step_state *from, const near_set *near, ascc_s
     ascc_step *step = from->detail;
     ascc_arena *arena = &step->arena;
     const size_t d = (size_t)near->particles.dimension, size = d * sizeof(double);
-    *state = (ascc_step_state){
-        .network = &step->network,
-        .particles = &near->particles,
-        .motion = from->motion,
-        .turn = from->turn,
-        .length_unit = step->model_length,
-        .time_unit = step->model_time,
-        .expected = step->expected,
-        .expected_pairs = &step->expected_pairs,
-        .engine = step->engine,
-        .trust = step->measures ? &step->model->trust : NULL,
-        .walls = &step->walls,
-        .tools = {arena, from->tools.workers, from->tools.kernels, from->tools.message},
-        .statistics = &step->statistics,
-        .since = ascc_clock(),
-        .share = near->share,
-        .walls_seen = near->walls,
-        .joins = true,
-        .advance = from->advance};
+    *state = ascc_step_open(step, &near->particles, from->motion);
+    state->turn = from->turn;
+    state->tools =
+        (ascc_search_tools){arena, from->tools.workers, from->tools.kernels, from->tools.message};
+    state->share = near->share;
+    state->walls_seen = near->walls;
+    state->joins = true;
+    state->advance = from->advance;
     if (from->sleep.idle) {
         state->sleep.idle = gather(near, arena, from->sleep.idle, 1);
         if (!state->sleep.idle)

@@ -42,16 +42,6 @@ static void widen(ascc_blocks *wide, const ascc_blocks *blocks, int32_t dimensio
                                                                   blocks->at[b][2] + z});
 }
 
-static bool lend_blocks(ascc_blocks *blocks, ascc_arena *arena, size_t most)
-{
-    const size_t slots = ascc_blocks_slots(most);
-    int64_t(*at)[3] = ascc_arena_lend(arena, most, sizeof *at);
-    uint32_t *slot = ascc_arena_lend(arena, slots, sizeof *slot);
-    if (at && slot)
-        ascc_blocks_open(blocks, at, slot, slots);
-    return at && slot;
-}
-
 /* Which walls are near. */
 static void mark(uint8_t *near, const ascc_blocks *wide, const ascc_particles *p, double edge)
 {
@@ -100,10 +90,10 @@ bool ascc_near_walls(ascc_step_state *state, uint8_t **near)
     *near = ascc_arena_lend(arena, p->boundary_count, 1);
     const ascc_arena_mark mark_of = ascc_arena_mark_of(arena);
     ascc_blocks blocks, wide;
-    bool room = *near && lend_blocks(&blocks, arena, ascc_sight_count(state));
+    bool room = *near && ascc_blocks_lend(&blocks, arena, ascc_sight_count(state));
     if (room) {
         add_places(&blocks, state, edge);
-        room = lend_blocks(&wide, arena, blocks.count * (p->dimension == 3 ? 27 : 9));
+        room = ascc_blocks_lend(&wide, arena, blocks.count * (p->dimension == 3 ? 27 : 9));
     }
     if (room) {
         widen(&wide, &blocks, p->dimension);

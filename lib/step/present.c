@@ -117,16 +117,6 @@ static bool note_row(const looking *l, size_t i)
     return ascc_kept_voxel(&m->kept, &l->scale, place, (int32_t)l->d, past->voxel[i]);
 }
 
-static bool open_blocks(ascc_blocks *blocks, ascc_arena *arena, size_t most)
-{
-    const size_t slots = ascc_blocks_slots(most);
-    int64_t(*at)[3] = ascc_arena_lend(arena, most, sizeof *at);
-    uint32_t *slot = ascc_arena_lend(arena, slots, sizeof *slot);
-    if (at && slot)
-        ascc_blocks_open(blocks, at, slot, slots);
-    return at && slot;
-}
-
 /* Voxels that rows have changed in, where they were and where they are, in blocks with room for all of them. False if
  * a row has none. */
 static bool note_rows(looking *l, ascc_blocks *changed)
@@ -156,7 +146,8 @@ static bool widen(ascc_blocks *to, const ascc_blocks *from, const looking *l, in
     ascc_blocks now = *from;
     for (size_t c = 0; c < l->d; c++) {
         ascc_blocks wide;
-        if (!open_blocks(&wide, l->state->tools.arena, now.count * (size_t)(below + above + 1)))
+        if (!ascc_blocks_lend(&wide, l->state->tools.arena,
+                              now.count * (size_t)(below + above + 1)))
             return false;
         for (size_t b = 0; b < now.count; b++)
             for (int64_t k = -below; k <= above; k++) {
@@ -178,13 +169,13 @@ static bool find_computed(const looking *l, const ascc_blocks *dirty, ascc_block
     const uint8_t *idle = l->state->sleep.idle;
     const int64_t more = kept->around > kept->reach ? kept->around - kept->reach : 0;
     ascc_blocks rows, wide;
-    if (!open_blocks(&rows, arena, l->holds.count))
+    if (!ascc_blocks_lend(&rows, arena, l->holds.count))
         return false;
     for (size_t i = 0; i < l->rows; i++)
         if (!idle[i])
             (void)ascc_blocks_add(&rows, l->holds.at[l->number[i]]);
     if (!widen(&wide, &rows, l, more, more) ||
-        !open_blocks(computed, arena, dirty->count + wide.count))
+        !ascc_blocks_lend(computed, arena, dirty->count + wide.count))
         return false;
     for (size_t b = 0; b < dirty->count; b++)
         (void)ascc_blocks_add(computed, dirty->at[b]);
@@ -267,7 +258,8 @@ static bool find_present(looking *l, bool known)
     for (size_t i = 0; i < l->rows; i++)
         others += !l->same[i];
     const size_t gone = m->past.count > l->rows ? m->past.count - l->rows : 0;
-    if (!open_blocks(&l->holds, arena, l->rows) || !open_blocks(&changed, arena, 2 * others + gone))
+    if (!ascc_blocks_lend(&l->holds, arena, l->rows) ||
+        !ascc_blocks_lend(&changed, arena, 2 * others + gone))
         return false;
     if (!note_rows(l, &changed) || !known)
         return true;

@@ -283,16 +283,12 @@ static ascc_status run_turned(const ascc_step *step, ascc_particles *p, ascc_ste
     return status;
 }
 
-ascc_status ascc_step_once(ascc_step *step, ascc_particles *p, const ascc_motion *motion,
-                           bool first, ascc_arena *arena, ascc_step_state *state)
+ascc_step_state ascc_step_open(ascc_step *step, const ascc_particles *p, const ascc_motion *motion)
 {
-    ascc_arena_reset(arena);
-    *state = (ascc_step_state){
+    return (ascc_step_state){
         .network = &step->network,
         .particles = p,
         .motion = motion,
-        .relaxation = &step->model->plan.relaxation,
-        .halo = step->halo,
         .turn = step->turn,
         .length_unit = step->model_length,
         .time_unit = step->model_time,
@@ -300,13 +296,23 @@ ascc_status ascc_step_once(ascc_step *step, ascc_particles *p, const ascc_motion
         .expected_pairs = &step->expected_pairs,
         .engine = step->engine,
         .trust = step->measures ? &step->model->trust : NULL,
-        .looks = step->looks,
-        .detail = step->detail,
         .walls = &step->walls,
-        .memory = &step->memory,
-        .tools = {arena, step->context->workers, &step->context->kernels, &step->message},
+        .tools = {&step->arena, step->context->workers, &step->context->kernels, &step->message},
         .statistics = &step->statistics,
         .since = ascc_clock()};
+}
+
+ascc_status ascc_step_once(ascc_step *step, ascc_particles *p, const ascc_motion *motion,
+                           bool first, ascc_arena *arena, ascc_step_state *state)
+{
+    ascc_arena_reset(arena);
+    *state = ascc_step_open(step, p, motion);
+    state->relaxation = &step->model->plan.relaxation;
+    state->halo = step->halo;
+    state->looks = step->looks;
+    state->detail = step->detail;
+    state->memory = &step->memory;
+    state->tools.arena = arena;
     const double begin = state->since;
     ascc_status status = remember(step, p);
     forget_distance(state->statistics);

@@ -36,6 +36,9 @@ struct ascc_step {
     ascc_message message;
 };
 
+/* What a step of a handle begins with, with its own arena; what only some steps have is left empty. */
+ascc_step_state ascc_step_open(ascc_step *step, const ascc_particles *p, const ascc_motion *motion);
+
 /* One step of a particle set that suits the model, with an arena that is reset first. On failure the
  * particles stay as they were. first: of a run, whose sums begin with it. */
 ascc_status ascc_step_once(ascc_step *step, ascc_particles *p, const ascc_motion *motion,
