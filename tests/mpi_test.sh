@@ -20,7 +20,7 @@ distributed() {
     program=$1
     processes=$2
     shift 2
-    timeout 120 mpirun -n "$processes" "$build/tests/$program" "$@"
+    timeout 400 mpirun -n "$processes" "$build/tests/$program" "$@"
 }
 models=examples/models
 flat="$models/water2d.safetensors"
@@ -38,7 +38,7 @@ check 'and on 3' distributed mpi_calls 3 1 $deep
 check 'three processes save and load what one does, and fail together' distributed mpi_snapshots 3 "$folder"
 
 # PROCESSES STEPS PREFIX: examples/hosts/mpi.c, which goes on from its last snapshot.
-host() { timeout 120 mpirun -n "$1" "$build/examples/hosts/host_mpi" $flat "$2" "$folder/$3"; }
+host() { timeout 400 mpirun -n "$1" "$build/examples/hosts/host_mpi" $flat "$2" "$folder/$3"; }
 hash_of() { sed 's/.*: hash //' "$1"; }
 
 # A process is killed; two go on from the last snapshot of three.
@@ -69,7 +69,7 @@ sim() { # FOLDER COMMAND...
 }
 root=$(pwd)
 files() {
-    (sim sim1 "$ascc") && (sim sim3 timeout 60 mpirun -n 3 "$ascc") && diff -r "$folder/sim1" "$folder/sim3" &&
+    (sim sim1 "$ascc") && (sim sim3 timeout 200 mpirun -n 3 "$ascc") && diff -r "$folder/sim1" "$folder/sim3" &&
         grep -q '20 of 0.005 s, 3 processes of 1 threads' "$folder/said" &&
         grep -q 'momentum error      0  (0 0 0 quanta' "$folder/said"
 }
@@ -78,7 +78,7 @@ check 'mpirun ascc sim writes the files that one process does' files
 refuses() {
     text=$1
     shift
-    timeout 60 mpirun -n 3 "$ascc-mpi" "$@" >"$folder/said" 2>&1 && return 1
+    timeout 200 mpirun -n 3 "$ascc-mpi" "$@" >"$folder/said" 2>&1 && return 1
     cat "$folder/said"
     [ "$(grep -c '^ascc' "$folder/said")" -eq 1 ] && grep -q "$text" "$folder/said"
 }
@@ -106,7 +106,7 @@ law() {
 }
 # A square whose corner is the origin, where all four quarters of the plane meet: nobody has ghosts of walls' far sides.
 counted() {
-    timeout 60 mpirun -n 4 "$build/bench/scaling" $flat 64 1 1 >"$folder/row" && cat "$folder/row" &&
+    timeout 200 mpirun -n 4 "$build/bench/scaling" $flat 64 1 1 >"$folder/row" && cat "$folder/row" &&
         awk -F, '{ good = NF == 17 && $1 == 4 && $3 == 4096 && $5 == 1024 && $7 > 0 && $8 < 1.1 * $7 && $9 > 48 * $7 && $11 > 0 } END { exit !good }' "$folder/row"
 }
 if [ -x "$build/bench/scaling" ]; then
