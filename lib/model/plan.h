@@ -30,6 +30,12 @@
 
 /* Point sets. Level 0 is fluid + boundary; set ASCC_SET_LEVEL + l - 1 is level l >= 1. */
 enum { ASCC_SET_FLUID = 0, ASCC_SET_BOUNDARY = 1, ASCC_SET_ALL = 2, ASCC_SET_LEVEL = 3 };
+/* The level of a set of fluid or a level. */
+static inline int32_t ascc_set_level(int32_t set)
+{
+    return set < ASCC_SET_LEVEL ? 0 : set - ASCC_SET_LEVEL + 1;
+}
+
 #define ASCC_MAX_SETS (ASCC_SET_LEVEL + ASCC_MAX_LEVELS - 1)
 /* No points, but pairs of them: its rows are the entries of one neighbour list (network/edges.h). */
 #define ASCC_SET_EDGES ASCC_MAX_SETS

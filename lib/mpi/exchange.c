@@ -262,7 +262,7 @@ static void unpack(const ascc_mpi_refresh *refresh, size_t ranks, const unsigned
 
 static const ascc_mpi_ghosts *ghosts_of(const ascc_mpi_particles *set, int32_t of)
 {
-    return &set->ghosts[of == ASCC_SET_FLUID ? 0 : of - ASCC_SET_LEVEL + 1];
+    return &set->ghosts[ascc_set_level(of)];
 }
 
 size_t ascc_mpi_sent(ascc_halo *halo, int32_t of, const uint32_t **rows)

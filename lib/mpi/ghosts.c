@@ -36,8 +36,7 @@ static void find_reach(ascc_mpi_particles *set)
             (1.0 + COVER) * (key->cube > 0.0 ? key->cube : key->radius) / step->model_length;
         if (key->source == ASCC_SET_BOUNDARY)
             continue;
-        double *most =
-            &set->reach[key->source == ASCC_SET_FLUID ? 0 : key->source - ASCC_SET_LEVEL + 1];
+        double *most = &set->reach[ascc_set_level(key->source)];
         *most = fmax(*most, reach);
     }
     if (relaxation->pressure.count && relaxation->rounds > 1)

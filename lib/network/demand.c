@@ -117,7 +117,7 @@ static double wall_reach(const ascc_network *network)
         if (key->query == ASCC_SET_ALL || key->source == ASCC_SET_ALL ||
             key->query == ASCC_SET_BOUNDARY)
             return INFINITY;
-        const int32_t level = key->query >= ASCC_SET_LEVEL ? key->query - ASCC_SET_LEVEL + 1 : 0;
+        const int32_t level = ascc_set_level(key->query);
         const double apart = level ? (1.0 + plan->hysteresis) * plan->level[level].voxel : 0.0;
         if (key->source == ASCC_SET_BOUNDARY)
             reach = fmax(reach, key->radius + apart);

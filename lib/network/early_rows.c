@@ -47,7 +47,7 @@ ascc_status ascc_early_rows_find(ascc_hierarchy *h, const ascc_search_tools *too
 {
     const size_t count = h->set[set].count;
     const ascc_arena_mark mark = ascc_arena_mark_of(tools->arena);
-    ascc_row_order *order = &h->order[set == ASCC_SET_FLUID ? 0 : set - ASCC_SET_LEVEL + 1];
+    ascc_row_order *order = &h->order[ascc_set_level(set)];
     uint8_t *early = ascc_arena_lend(tools->arena, count, 1);
     if (early) {
         mark_early(h, set, early, count);
@@ -90,7 +90,7 @@ ascc_status ascc_early_list_run(const ascc_hierarchy *h, const ascc_search_tools
         return ASCC_OK;
     }
     ascc_workers_run(tools->workers, early, block, function, data);
-    const ascc_status status = ascc_hierarchy_send(h, refresh);
+    const ascc_status status = halo->send(halo, refresh, ascc_hierarchy_halo_rows(h, refresh));
     if (status != ASCC_OK)
         return status;
     for (size_t s = 0, end; s < SLICES; s++) {
@@ -125,7 +125,7 @@ ascc_status ascc_early_rows_run(const ascc_hierarchy *h, const ascc_search_tools
         ascc_workers_run(tools->workers, h->set[set].count, block, function, data);
         return ASCC_OK;
     }
-    const ascc_row_order *order = &h->order[set == ASCC_SET_FLUID ? 0 : set - ASCC_SET_LEVEL + 1];
+    const ascc_row_order *order = &h->order[ascc_set_level(set)];
     range_job job = {function, data, order->range};
     return ascc_early_list_run(h, tools, order->early, order->count, RANGES, run_ranges, &job,
                                refresh);

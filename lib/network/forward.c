@@ -359,7 +359,7 @@ static int32_t sent_with(const ascc_network_run *run, int32_t l)
 static size_t list_in_order(const ascc_hierarchy *h, int32_t set, const uint8_t *active,
                             uint32_t *list, size_t *early)
 {
-    const ascc_row_order *order = &h->order[set == ASCC_SET_FLUID ? 0 : set - ASCC_SET_LEVEL + 1];
+    const ascc_row_order *order = &h->order[ascc_set_level(set)];
     size_t count = 0;
     *early = 0;
     for (size_t k = 0; k < order->count; k++) {
@@ -398,12 +398,12 @@ static ascc_status run_job(layer_job *job, uint32_t *list, size_t next_width)
     const uint8_t *active = run->value[value].active;
     size_t count, early = 0;
     ascc_halo_refresh refresh;
-    if (job->fresh)
+    if (job->fresh) {
         count = list_in_order(run->hierarchy, layer->set, active, list, &early);
-    else
-        count = list_active(tools, active, ascc_network_rows(run, layer->set), list);
-    if (job->fresh)
         refresh_of(run, job->fresh, &refresh);
+    } else {
+        count = list_active(tools, active, ascc_network_rows(run, layer->set), list);
+    }
     const ascc_status status =
         ascc_early_list_run(run->hierarchy, tools, early, count, ASCC_TILE_ROWS * 4, compute_tiles,
                             job, job->fresh ? &refresh : NULL);

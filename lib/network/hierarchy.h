@@ -111,23 +111,19 @@ static inline size_t ascc_hierarchy_wall_row(const ascc_hierarchy *hierarchy, si
     return ascc_hierarchy_host_row(hierarchy, ASCC_SET_BOUNDARY, row) - hierarchy->fluid_count;
 }
 
-/* Of a set's rows, with a halo only: sends them, for halo->receive to end; or all of it, nothing without a halo. */
-static inline ascc_status ascc_hierarchy_send(const ascc_hierarchy *hierarchy,
-                                              const ascc_halo_refresh *refresh)
+/* Which rows of the arrays of a refresh the host's rows of its set are. */
+static inline const uint32_t *ascc_hierarchy_halo_rows(const ascc_hierarchy *hierarchy,
+                                                       const ascc_halo_refresh *refresh)
 {
-    return hierarchy->halo->send(hierarchy->halo, refresh,
-                                 refresh->set == ASCC_SET_FLUID ? hierarchy->halo_row : NULL);
+    return refresh->set == ASCC_SET_FLUID ? hierarchy->halo_row : NULL;
 }
 
+/* Ghosts of a set become what their owners have, in arrays of its rows; nothing without a halo. */
 static inline ascc_status ascc_hierarchy_refresh(const ascc_hierarchy *hierarchy,
                                                  const ascc_halo_refresh *refresh)
 {
-    if (!hierarchy->halo)
-        return ASCC_OK;
-    const ascc_status status = ascc_hierarchy_send(hierarchy, refresh);
-    if (status == ASCC_OK)
-        hierarchy->halo->receive(hierarchy->halo);
-    return status;
+    return ascc_halo_exchange(hierarchy->halo, refresh,
+                              ascc_hierarchy_halo_rows(hierarchy, refresh));
 }
 
 #endif

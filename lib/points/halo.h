@@ -79,6 +79,16 @@ struct ascc_halo {
                         size_t *first);
 };
 
+/* A refresh at once: nobody works meanwhile. Nothing without a halo. */
+static inline ascc_status ascc_halo_exchange(ascc_halo *halo, const ascc_halo_refresh *refresh,
+                                             const uint32_t *row)
+{
+    const ascc_status status = halo ? halo->send(halo, refresh, row) : ASCC_OK;
+    if (halo && status == ASCC_OK)
+        halo->receive(halo);
+    return status;
+}
+
 /* The largest of one or two numbers >= 0 over all processes: their bits are in the order of the numbers. */
 static inline ascc_status ascc_halo_largest(ascc_halo *halo, double *number, size_t count)
 {

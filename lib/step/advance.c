@@ -101,12 +101,7 @@ ascc_status ascc_advance_refresh(ascc_step_state *state)
         false,
         2,
         {{state->advance.position, size}, {state->advance.momentum, size}}};
-    if (!state->halo)
-        return ASCC_OK;
-    const ascc_status status = state->halo->send(state->halo, &refresh, NULL);
-    if (status == ASCC_OK)
-        state->halo->receive(state->halo);
-    return status;
+    return ascc_halo_exchange(state->halo, &refresh, NULL);
 }
 
 ascc_status ascc_stage_advance(ascc_step_state *state)

@@ -79,16 +79,11 @@ typedef struct sight {
 
 static bool lend_sight(sight *s, ascc_arena *arena, const ascc_particles *p)
 {
-    const size_t n = p->fluid_count, slots = ascc_blocks_slots(n);
-    int64_t(*at)[3] = ascc_arena_lend(arena, n, sizeof *at);
-    uint32_t *slot = ascc_arena_lend(arena, slots, sizeof *slot);
-    *s = (sight){.weighted = ascc_arena_lend(arena, n, 1),
+    *s = (sight){.weighted = ascc_arena_lend(arena, p->fluid_count, 1),
                  .edge = SIGHT / REACH * p->spacing,
                  .dimension = p->dimension,
                  .last = {INT64_MAX, 0, 0}};
-    if (at && slot)
-        ascc_blocks_open(&s->blocks, at, slot, slots);
-    return at && slot && s->weighted;
+    return s->weighted && ascc_blocks_lend(&s->blocks, arena, p->fluid_count);
 }
 
 /* Rows that follow one another lie mostly in one block. */
