@@ -1093,17 +1093,35 @@ static void training_lowers_the_loss(void **state)
     free(m);
 }
 
+/* What a reader makes of the file that a trainer gives, in a context of its own. */
+static ascc_model *read_model(ascc_trainer *trainer, ascc_context **context)
+{
+    size_t size;
+    const void *bytes = ascc_trainer_model(trainer, 0, &size);
+    assert_non_null(bytes);
+    ascc_model *model = NULL;
+    assert_int_equal(ascc_context_create(NULL, context), ASCC_OK);
+    assert_int_equal(ascc_model_load_memory(*context, bytes, size, &model), ASCC_OK);
+    return model;
+}
+
+/* A relaxation in 2D with these sweeps, as a description has it. */
+static void describe_relaxation(char text[320], const char *omega)
+{
+    (void)snprintf(text, 320,
+                   "{\"support\":%s,\"rest_volume\":%s,\"omega\":[%s],"
+                   "\"epsilon\":0.1,\"limit\":%s,\"divergence\":[0.5,0.5]}",
+                   model_number(2.0 * SPACING), model_number(0.8 * SPACING * SPACING), omega,
+                   model_number(0.2 * SPACING));
+}
+
 /* Computed forwards, passed through by the gradient: weights learn all the same, and the file keeps it. */
 static void a_relaxation_is_trained_with_and_kept(void **state)
 {
     (void)state;
     model_random random = everything(26, 2);
-    char text[256];
-    (void)snprintf(text, sizeof text,
-                   "{\"support\":%s,\"rest_volume\":%s,\"omega\":[1.862,0.259,0.346,0.662],"
-                   "\"epsilon\":0.1,\"limit\":%s,\"divergence\":[0.5,0.5]}",
-                   model_number(2.0 * SPACING), model_number(0.8 * SPACING * SPACING),
-                   model_number(0.2 * SPACING));
+    char text[320];
+    describe_relaxation(text, "1.862,0.259,0.346,0.662");
     random.relaxation = text;
     const ascc_trainer_options options = augmented();
     motion *m = make_motion(10, 2);
@@ -1117,12 +1135,8 @@ static void a_relaxation_is_trained_with_and_kept(void **state)
     assert_int_equal(ascc_trainer_gradient(a, 0, 1, 0, 2, &after, NULL), ASCC_OK);
     print_message("# loss: %.4g before, %.4g after\n", before, after);
     assert_true(after < before);
-    size_t size;
-    const void *bytes = ascc_trainer_model(a, 0, &size);
     ascc_context *context = NULL;
-    ascc_model *model = NULL;
-    assert_int_equal(ascc_context_create(NULL, &context), ASCC_OK);
-    assert_int_equal(ascc_model_load_memory(context, bytes, size, &model), ASCC_OK);
+    ascc_model *model = read_model(a, &context);
     assert_int_equal(model->plan.relaxation.pressure.count, 4);
     ascc_model_destroy(&model);
     ascc_context_destroy(&context);
@@ -1138,11 +1152,7 @@ static void constants_of_a_relaxation_are_learned_within_what_a_model_may_have(v
     (void)state;
     model_random random = everything(31, 2);
     char text[320];
-    (void)snprintf(text, sizeof text,
-                   "{\"support\":%s,\"rest_volume\":%s,\"omega\":[0.5,0.5,0.5],"
-                   "\"epsilon\":0.1,\"limit\":%s,\"divergence\":[0.5,0.5]}",
-                   model_number(2.0 * SPACING), model_number(0.8 * SPACING * SPACING),
-                   model_number(0.2 * SPACING));
+    describe_relaxation(text, "0.5,0.5,0.5");
     random.relaxation = text;
     ascc_trainer_options options = augmented();
     static const ascc_training_stage fast = {.end = 1000, .unroll = 1, .learning_rate = 0.05};
@@ -1166,12 +1176,8 @@ static void constants_of_a_relaxation_are_learned_within_what_a_model_may_have(v
     iterate(a, 20);
     iterate(b, 20);
     assert_same_models(a, b);
-    size_t size;
-    const void *bytes = ascc_trainer_model(a, 0, &size);
     ascc_context *context = NULL;
-    ascc_model *model = NULL;
-    assert_int_equal(ascc_context_create(NULL, &context), ASCC_OK);
-    assert_int_equal(ascc_model_load_memory(context, bytes, size, &model), ASCC_OK);
+    ascc_model *model = read_model(a, &context);
     const ascc_relaxation *r = &model->plan.relaxation;
     free(values);
     values = parameters_of(a);
@@ -1214,12 +1220,9 @@ static void blind(ascc_trainer *trainer, size_t d)
                {"conv_boundary.kernel", 2 * d + 1, 0, 2},
                {"dense_fluid.kernel", d + 1, d, 4}};
     float *values = parameters_of(trainer);
-    size_t size, at = 0;
-    const void *bytes = ascc_trainer_model(trainer, 0, &size);
+    size_t at = 0;
     ascc_context *context = NULL;
-    ascc_model *model = NULL;
-    assert_int_equal(ascc_context_create(NULL, &context), ASCC_OK);
-    assert_int_equal(ascc_model_load_memory(context, bytes, size, &model), ASCC_OK);
+    ascc_model *model = read_model(trainer, &context);
     oracle_tensor list[ORACLE_MAX_TENSORS];
     const size_t tensors = oracle_tensors(model, list);
     for (size_t t = 0; t < tensors; at += list[t++].count)
@@ -1288,13 +1291,9 @@ static void the_model_that_comes_out_has_the_weights(void **state)
     ascc_trainer *trainer = open_trainer(&o, &random, m);
     iterate(trainer, 2);
     float *values = parameters_of(trainer);
-    size_t size, at = 0;
-    const void *bytes = ascc_trainer_model(trainer, 0, &size);
-    assert_non_null(bytes);
+    size_t at = 0;
     ascc_context *context = NULL;
-    ascc_model *model = NULL;
-    assert_int_equal(ascc_context_create(NULL, &context), ASCC_OK);
-    assert_int_equal(ascc_model_load_memory(context, bytes, size, &model), ASCC_OK);
+    ascc_model *model = read_model(trainer, &context);
     oracle_tensor list[ORACLE_MAX_TENSORS];
     const size_t tensors = oracle_tensors(model, list);
     for (size_t t = 0; t < tensors; at += list[t++].count) {
